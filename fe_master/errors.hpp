@@ -1,0 +1,12 @@
+#pragma once
+
+#include <stdexcept>
+
+namespace femxdem {
+
+/// A mistake of the user: its text is one clear sentence (what, where, what to do); the program ends with status 2.
+struct UserError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace femxdem
