@@ -23,10 +23,41 @@ struct Side {
 ///     7       5      side k runs from corner k over node 4 + k to corner (k + 1) % 4.
 ///     0 --4-- 1
 struct Mesh {
-  std::vector<Point2> nodes;                        ///< reference coordinates [m]
+  std::vector<Point2> nodes;  ///< reference coordinates [m]
   std::vector<std::array<int, 8>> elements;
   std::map<std::string, std::vector<Side>> edges;   ///< named edges, sides in order along the edge
   std::map<std::string, std::vector<int>> regions;  ///< named sets of elements
 };
+
+struct MeshParameters;
+struct Case;
+
+/// Structured nx x ny mesh of [0, width] x [0, height] [m]; edges bottom, right, top, left.
+Mesh rectangle_mesh(double width, double height, int nx, int ny);
+
+/// Structured nr x nt mesh of the sector 0 <= theta <= angle [deg], inner_radius <= r <= outer_radius [m], mid-side
+/// nodes on the circles; edges inner, outer, start (theta = 0), end (theta = angle). A full ring (360) has no start and
+/// end.
+Mesh annulus_mesh(double inner_radius, double outer_radius, double angle, int nr, int nt);
+
+/// Mesh of 8-node quadrilaterals from a file that Gmsh reads (.msh, or .geo, which it then meshes); physical curves
+/// give the edges, physical surfaces the regions. Throws UserError on another element, an unnamed or bad file.
+Mesh gmsh_mesh(const std::string& file);
+
+/// Shifts interior corners at random by at most `distortion` times the shortest side at that corner, and keeps sides
+/// straight where they were; the same seed gives the same mesh.
+void distort(Mesh& mesh, double distortion, int seed);
+
+/// Mesh of a case: builder, distortion, regions of the case; checked by check_mesh. Throws UserError.
+Mesh make_mesh(const Case& c);
+
+/// Throws UserError naming the first element whose Jacobian is not positive at a corner or Gauss point.
+void check_mesh(const Mesh& mesh);
+
+/// Centre of an element: mean of its corners [m].
+Point2 element_centre(const Mesh& mesh, int element);
+
+/// Lengths of the sides of a named edge along their quadratic shape, summed [m].
+double edge_length(const Mesh& mesh, const std::string& edge);
 
 }  // namespace femxdem
