@@ -94,7 +94,7 @@ struct VeParameters {
   std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
   Assignment assignment = Assignment::same;  ///< of the pool to the elements
   int assignment_seed = 1;
-  std::string cache;  ///< folder of prepared packings, absolute path
+  std::string cache;  ///< folder of prepared packings, absolute path; empty: the caller chooses
 };
 /// The VE of one region: the base with the region's own values over it.
 struct RegionVe {
@@ -107,6 +107,7 @@ enum class LoadKind { displacement, velocity, traction, pressure, gradient };
 enum class Component { none, x, y, xx, xy, yx, yy };
 struct Load {
   std::string edge;
+  std::vector<double> point;  ///< x, y [m]: acts on the node nearest to it instead of an edge (a pin); or empty
   LoadKind kind = LoadKind::displacement;
   Component component = Component::none;
   double value = kNotGiven;                  ///< [m], [m/s], [Pa per initial area], [Pa, compression positive], [-]
@@ -156,7 +157,7 @@ struct SolverParameters {
 };
 
 struct OutputParameters {
-  std::string directory;     ///< absolute path, or empty: the caller chooses
+  std::string directory;     ///< relative to the current folder; empty: the caller chooses
   int every = 1;             ///< steps between field outputs
   int checkpoint_every = 0;  ///< steps between checkpoints; 0: none
 };
