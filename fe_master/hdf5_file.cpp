@@ -1,0 +1,201 @@
+#include "hdf5_file.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+namespace femxdem {
+namespace {
+
+/// An HDF5 identifier that is closed at the end of its scope.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle(hid_t id, Close close) : id_(id), close_(close) {}
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+hid_t creation_of_missing_groups() {
+  const hid_t list = H5Pcreate(H5P_LINK_CREATE);
+  H5Pset_create_intermediate_group(list, 1);
+  return list;
+}
+
+hid_t string_type(std::size_t length) {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(length, 1));
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  return type;
+}
+
+}  // namespace
+
+Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file) {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are exceptions, not text on stderr
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_file_locking(access, false, true);
+  const std::string name = file.string();
+  if (mode == Mode::create) {
+    id_ = H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  } else {
+    id_ = H5Fopen(name.c_str(), mode == Mode::read ? H5F_ACC_RDONLY : H5F_ACC_RDWR, access);
+  }
+  if (id_ < 0) fail(mode == Mode::create ? "cannot create the file" : "cannot open the file as HDF5", "/");
+}
+
+Hdf5File::~Hdf5File() {
+  if (id_ >= 0) H5Fclose(id_);
+}
+
+void Hdf5File::fail(std::string_view what, std::string_view path) const {
+  throw std::runtime_error(fmt::format("{}: {} ({})", file_.string(), what, path));
+}
+
+void Hdf5File::write_raw(const std::string& path, const void* values, std::size_t count, const Shape& shape,
+                         std::int64_t memory_type, std::int64_t file_type) {
+  const std::size_t product = std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+  if (product != count) fail(fmt::format("{} values do not fill the shape of {}", count, product), path);
+  const std::vector<hsize_t> lengths(shape.begin(), shape.end());
+  const Handle space(H5Screate_simple(static_cast<int>(lengths.size()), lengths.data(), nullptr), H5Sclose);
+  const Handle links(creation_of_missing_groups(), H5Pclose);
+  const Handle set(H5Dcreate2(id_, path.c_str(), file_type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+  if (set < 0) fail("cannot create the data set", path);
+  if (count > 0 && H5Dwrite(set, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
+    fail("cannot write the data set; is the disk full?", path);
+  }
+}
+
+void Hdf5File::write(const std::string& path, std::span<const double> values, const Shape& shape) {
+  write_raw(path, values.data(), values.size(), shape, H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE);
+}
+
+void Hdf5File::write(const std::string& path, std::span<const int> values, const Shape& shape) {
+  write_raw(path, values.data(), values.size(), shape, H5T_NATIVE_INT, H5T_STD_I32LE);
+}
+
+void Hdf5File::write_bytes(const std::string& path, std::string_view bytes) {
+  write_raw(path, bytes.data(), bytes.size(), {bytes.size()}, H5T_NATIVE_UINT8, H5T_STD_U8LE);
+}
+
+void Hdf5File::make_group(const std::string& path) {
+  const Handle links(creation_of_missing_groups(), H5Pclose);
+  const Handle group(H5Gcreate2(id_, path.c_str(), links, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  if (group < 0) fail("cannot create the group", path);
+}
+
+void Hdf5File::remove(const std::string& path) {
+  if (H5Ldelete(id_, path.c_str(), H5P_DEFAULT) < 0) fail("cannot remove", path);
+}
+
+void Hdf5File::set_scalar(const std::string& group, const std::string& name, const void* value, std::int64_t type) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(
+      H5Acreate_by_name(id_, group.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+      H5Aclose);
+  if (attribute < 0 || H5Awrite(attribute, type, value) < 0) fail("cannot write attribute " + name, group);
+}
+
+void Hdf5File::set_attribute(const std::string& group, const std::string& name, double value) {
+  set_scalar(group, name, &value, H5T_NATIVE_DOUBLE);
+}
+
+void Hdf5File::set_attribute(const std::string& group, const std::string& name, int value) {
+  set_scalar(group, name, &value, H5T_NATIVE_INT);
+}
+
+void Hdf5File::set_attribute(const std::string& group, const std::string& name, const std::string& value) {
+  const Handle type(string_type(value.size()), H5Tclose);
+  set_scalar(group, name, value.c_str(), type);
+}
+
+Shape Hdf5File::shape(const std::string& path) const {
+  const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (set < 0) fail("no such data set", path);
+  const Handle space(H5Dget_space(set), H5Sclose);
+  std::vector<hsize_t> lengths(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space)));
+  H5Sget_simple_extent_dims(space, lengths.data(), nullptr);
+  return {lengths.begin(), lengths.end()};
+}
+
+std::vector<double> Hdf5File::read(const std::string& path) const {
+  const Shape lengths = shape(path);
+  std::vector<double> values(std::accumulate(lengths.begin(), lengths.end(), std::size_t{1}, std::multiplies<>()));
+  const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!values.empty() && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail("cannot read the data set", path);
+  }
+  return values;
+}
+
+std::string Hdf5File::read_bytes(const std::string& path) const {
+  std::string bytes(shape(path).at(0), '\0');
+  const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!bytes.empty() && H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0) {
+    fail("cannot read the data set", path);
+  }
+  return bytes;
+}
+
+double Hdf5File::number(const std::string& group, const std::string& name) const {
+  const Handle attribute(H5Aopen_by_name(id_, group.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  double value = 0;
+  if (attribute < 0 || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) fail("no attribute " + name, group);
+  return value;
+}
+
+std::string Hdf5File::text(const std::string& group, const std::string& name) const {
+  const Handle attribute(H5Aopen_by_name(id_, group.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (attribute < 0) fail("no attribute " + name, group);
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  std::string value(H5Tget_size(type), '\0');
+  if (H5Aread(attribute, type, value.data()) < 0) fail("cannot read attribute " + name, group);
+  value.erase(std::find(value.begin(), value.end(), '\0'), value.end());
+  return value;
+}
+
+std::vector<std::string> Hdf5File::attributes(const std::string& group) const {
+  std::vector<std::string> names;
+  const auto collect = [](hid_t, const char* name, const H5A_info_t*, void* list) -> herr_t {
+    static_cast<std::vector<std::string>*>(list)->emplace_back(name);
+    return 0;
+  };
+  if (H5Aiterate_by_name(id_, group.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names, H5P_DEFAULT) < 0) {
+    fail("cannot list the attributes", group);
+  }
+  return names;
+}
+
+bool Hdf5File::exists(const std::string& path) const {
+  for (std::size_t end = path.find('/', 1); end != std::string::npos; end = path.find('/', end + 1)) {
+    if (H5Lexists(id_, path.substr(0, end).c_str(), H5P_DEFAULT) <= 0) return false;
+  }
+  return path == "/" || H5Lexists(id_, path.c_str(), H5P_DEFAULT) > 0;
+}
+
+std::vector<std::string> Hdf5File::members(const std::string& group) const {
+  std::vector<std::string> names;
+  if (!exists(group)) return names;
+  const Handle handle(H5Gopen2(id_, group.c_str(), H5P_DEFAULT), H5Gclose);
+  const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
+    static_cast<std::vector<std::string>*>(list)->emplace_back(name);
+    return 0;
+  };
+  if (H5Literate(handle, H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) fail("cannot list", group);
+  return names;
+}
+
+}  // namespace femxdem

@@ -1,0 +1,93 @@
+#include "summary.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "output_folder.hpp"
+
+namespace femxdem {
+namespace {
+
+std::string json_string(std::string_view text) {
+  std::string json = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      json += {'\\', c};
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      json += fmt::format("\\u{:04x}", static_cast<int>(c));
+    } else {
+      json += c;
+    }
+  }
+  return json + "\"";
+}
+
+std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.15g}", value) : "null"; }
+
+using Members = std::vector<std::pair<std::string, std::string>>;
+
+std::string object(const Members& members, std::string_view indent) {
+  std::string json = "{";
+  std::string_view separator = "\n";
+  for (const auto& [key, value] : members) {
+    json += fmt::format("{}{}  {}: {}", separator, indent, json_string(key), value);
+    separator = ",\n";
+  }
+  return json + fmt::format("\n{}}}", indent);
+}
+
+}  // namespace
+
+std::string to_json(const Summary& summary, const std::string& date, const std::string& host) {
+  const double capacity = summary.ranks * summary.evaluate_seconds;
+  Members versions;
+  for (const auto& [name, version] : summary.versions) versions.emplace_back(name, json_string(version));
+  const Members members = {
+      {"status", json_string(summary.status)},
+      {"message", json_string(summary.message)},
+      {"exit_status", number(summary.exit_status)},
+      {"steps", number(summary.steps)},
+      {"evaluations", number(static_cast<double>(summary.evaluations))},
+      {"dem_steps", number(summary.dem_steps)},
+      {"ranks", number(summary.ranks)},
+      {"wall_seconds", number(summary.wall_seconds)},
+      {"evaluate_seconds", number(summary.evaluate_seconds)},
+      {"trial_seconds", number(summary.trial_seconds)},
+      {"engine_seconds", number(summary.engine_seconds)},
+      {"parallel_efficiency", number(summary.trial_seconds / capacity)},
+      {"engine_share", number(summary.engine_seconds / capacity)},
+      {"overhead_ratio", number(1 - summary.engine_seconds / capacity)},
+      {"peak_memory_master_bytes", number(static_cast<double>(summary.peak_memory_master))},
+      {"peak_memory_workers_bytes", number(static_cast<double>(summary.peak_memory_workers))},
+      {"case_hash", json_string(summary.case_hash)},
+      {"date", json_string(date)},
+      {"host", json_string(host)},
+      {"command_line", json_string(summary.command_line)},
+      {"versions", object(versions, "  ")},
+  };
+  return object(members, "") + "\n";
+}
+
+void write_summary(const std::filesystem::path& file, const Summary& summary) {
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  const std::string date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  replace_file(file, to_json(summary, date, host.data()));
+}
+
+std::uint64_t peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+}  // namespace femxdem

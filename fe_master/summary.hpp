@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace femxdem {
+
+/// How a run ended and what it cost: summary.json.
+struct Summary {
+  std::string status;   ///< "done", "not converged", "failed"
+  std::string message;  ///< one sentence
+  int exit_status = 0;
+  int steps = 0;         ///< converged
+  long evaluations = 0;  ///< of all material points
+  double dem_steps = 0;  ///< over all points and evaluations
+  int ranks = 1;
+  double wall_seconds = 0;                ///< of the run
+  double evaluate_seconds = 0;            ///< wall time inside MaterialPoints::evaluate
+  double trial_seconds = 0;               ///< of the points' trials, summed over the ranks
+  double engine_seconds = 0;              ///< of which inside the DEM engine's steps
+  std::uint64_t peak_memory_master = 0;   ///< [byte]
+  std::uint64_t peak_memory_workers = 0;  ///< summed over the ranks [byte]
+  std::string case_hash;
+  std::string command_line;
+  std::map<std::string, std::string> versions;
+};
+
+/// JSON of the summary with what follows from it: `parallel_efficiency` = trial seconds / (ranks x wall seconds of
+/// evaluate), `engine_share` = engine seconds / (the same), `overhead_ratio` = 1 - engine_share; null where unknown.
+std::string to_json(const Summary& summary, const std::string& date, const std::string& host);
+
+/// Writes it with the date (UTC, ISO 8601) and the name of this machine.
+void write_summary(const std::filesystem::path& file, const Summary& summary);
+
+/// Largest resident memory of this process so far [byte].
+std::uint64_t peak_memory();
+
+}  // namespace femxdem
