@@ -1,0 +1,203 @@
+#include <fmt/core.h>
+#include <gmsh.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <filesystem>
+
+#include "errors.hpp"
+#include "mesh.hpp"
+
+namespace femxdem {
+
+namespace {
+
+constexpr int kLine3 = 8;  // Gmsh's element types
+constexpr int kQuad8 = 16;
+
+/// Gmsh's session; it has one per process.
+struct GmshSession {
+  GmshSession() {
+    gmsh::initialize(0, nullptr, false);
+    gmsh::option::setNumber("General.Terminal", 0);
+    gmsh::option::setNumber("Mesh.ElementOrder", 2);
+    gmsh::option::setNumber("Mesh.SecondOrderIncomplete", 1);
+  }
+  ~GmshSession() { gmsh::finalize(); }
+  GmshSession(const GmshSession&) = delete;
+  GmshSession& operator=(const GmshSession&) = delete;
+};
+
+struct ElementBlock {
+  std::vector<std::size_t> tags, nodes;
+};
+
+/// Elements of one type on the entity (dim, tag), -1: all; another type is the user's mistake.
+ElementBlock elements_of_type(int wanted, int dim, int tag, const std::string& file) {
+  std::vector<int> types;
+  std::vector<std::vector<std::size_t>> tags, nodes;
+  gmsh::model::mesh::getElements(types, tags, nodes, dim, tag);
+  ElementBlock block;
+  for (std::size_t t = 0; t < types.size(); ++t) {
+    if (types[t] != wanted) {
+      std::string name;
+      int dimension = 0, order = 0, count = 0, primary = 0;
+      std::vector<double> coordinates;
+      gmsh::model::mesh::getElementProperties(types[t], name, dimension, order, count, coordinates, primary);
+      throw UserError(
+          fmt::format("{}: {} elements of type '{}', but only 8-node quadrilaterals are known; in Gmsh: "
+                      "Recombine Surface, Mesh.ElementOrder = 2, Mesh.SecondOrderIncomplete = 1",
+                      file, tags[t].size(), name));
+    }
+    block.tags.insert(block.tags.end(), tags[t].begin(), tags[t].end());
+    block.nodes.insert(block.nodes.end(), nodes[t].begin(), nodes[t].end());
+  }
+  return block;
+}
+
+/// Nodes that the elements use, in Gmsh's order; the map is from Gmsh's tag to our number.
+std::map<std::size_t, int> read_nodes(const ElementBlock& quads, const std::string& file, Mesh& mesh) {
+  std::vector<std::size_t> tags;
+  std::vector<double> x, parametric;
+  gmsh::model::mesh::getNodes(tags, x, parametric, -1, -1, false, false);
+  std::map<std::size_t, Eigen::Vector3d> position;
+  for (std::size_t n = 0; n < tags.size(); ++n) position[tags[n]] = {x[3 * n], x[3 * n + 1], x[3 * n + 2]};
+  std::map<std::size_t, int> number;
+  for (std::size_t tag : quads.nodes) number[tag] = 0;
+  for (auto& [tag, n] : number) {
+    const Eigen::Vector3d& p = position.at(tag);
+    if (p.z() != 0.0)
+      throw UserError(
+          fmt::format("{}: node {} lies at z = {:.3g}; draw the mesh in the plane z = 0", file, tag, p.z()));
+    n = static_cast<int>(mesh.nodes.size());
+    mesh.nodes.emplace_back(p.x(), p.y());
+  }
+  return number;
+}
+
+/// An element with its corners counter-clockwise, whatever side Gmsh looked from.
+std::array<int, 8> oriented(const std::array<int, 8>& e, const Mesh& mesh) {
+  const Point2 a = mesh.nodes[e[2]] - mesh.nodes[e[0]], b = mesh.nodes[e[3]] - mesh.nodes[e[1]];
+  if (a.x() * b.y() - a.y() * b.x() >= 0.0) return e;
+  return {e[0], e[3], e[2], e[1], e[7], e[6], e[5], e[4]};
+}
+
+/// Sides in order along the edge, one connected chain after another.
+std::vector<Side> in_order(std::vector<Side> sides) {
+  std::vector<Side> ordered;
+  while (!sides.empty()) {
+    std::deque<Side> chain{sides.front()};
+    sides.erase(sides.begin());
+    for (bool grown = true; grown;) {
+      const auto next = std::find_if(sides.begin(), sides.end(), [&](const Side& s) {
+        return s.nodes[0] == chain.back().nodes[2] || s.nodes[2] == chain.front().nodes[0];
+      });
+      grown = next != sides.end();
+      if (!grown) break;
+      next->nodes[0] == chain.back().nodes[2] ? chain.push_back(*next) : chain.push_front(*next);
+      sides.erase(next);
+    }
+    ordered.insert(ordered.end(), chain.begin(), chain.end());
+  }
+  return ordered;
+}
+
+/// Sides of all elements by their mid-side node; on the boundary there is one.
+std::multimap<int, Side> sides_by_middle(const Mesh& mesh) {
+  std::multimap<int, Side> sides;
+  for (int e = 0; e < static_cast<int>(mesh.elements.size()); ++e) {
+    const auto& n = mesh.elements[e];
+    for (int k = 0; k < 4; ++k) sides.insert({n[4 + k], Side{e, {n[k], n[4 + k], n[(k + 1) % 4]}}});
+  }
+  return sides;
+}
+
+std::string group_name(int dim, int tag, const std::string& file) {
+  std::string name;
+  gmsh::model::getPhysicalName(dim, tag, name);
+  if (name.empty())
+    throw UserError(fmt::format("{}: physical {} {} has no name; write Physical {}(\"name\") = ...", file,
+                                dim == 1 ? "curve" : "surface", tag, dim == 1 ? "Curve" : "Surface"));
+  return name;
+}
+
+std::vector<int> group_entities(int dim, int tag) {
+  std::vector<int> entities;
+  gmsh::model::getEntitiesForPhysicalGroup(dim, tag, entities);
+  return entities;
+}
+
+std::vector<Side> sides_of_curve(int group, const std::string& name, const std::string& file,
+                                 const std::map<std::size_t, int>& number, const std::multimap<int, Side>& all) {
+  std::vector<Side> sides;
+  for (int entity : group_entities(1, group)) {
+    const ElementBlock lines = elements_of_type(kLine3, 1, entity, file);
+    for (std::size_t l = 0; l < lines.tags.size(); ++l) {
+      const auto middle = number.find(lines.nodes[3 * l + 2]);
+      const std::size_t owners = middle == number.end() ? 0 : all.count(middle->second);
+      if (owners != 1)
+        throw UserError(fmt::format(
+            "{}: physical curve '{}' is a side of {} elements; name curves of the boundary only", file, name, owners));
+      sides.push_back(all.find(middle->second)->second);
+    }
+  }
+  return in_order(sides);
+}
+
+Mesh read_model(const std::string& file) {
+  Mesh mesh;
+  const ElementBlock quads = elements_of_type(kQuad8, 2, -1, file);
+  if (quads.tags.empty())
+    throw UserError(fmt::format("{}: no surface elements; mesh the surfaces with 8-node quadrilaterals", file));
+  const std::map<std::size_t, int> number = read_nodes(quads, file, mesh);
+  std::map<std::size_t, int> element_number;
+  for (std::size_t q = 0; q < quads.tags.size(); ++q) {
+    std::array<int, 8> nodes{};
+    for (int a = 0; a < 8; ++a) nodes[a] = number.at(quads.nodes[8 * q + a]);
+    element_number[quads.tags[q]] = static_cast<int>(mesh.elements.size());
+    mesh.elements.push_back(oriented(nodes, mesh));
+  }
+  const std::multimap<int, Side> sides = sides_by_middle(mesh);
+  gmsh::vectorpair groups;
+  gmsh::model::getPhysicalGroups(groups);
+  for (const auto& [dim, tag] : groups) {
+    if (dim == 1) {
+      const std::string name = group_name(dim, tag, file);
+      mesh.edges[name] = sides_of_curve(tag, name, file, number, sides);
+    } else if (dim == 2) {
+      std::vector<int>& region = mesh.regions[group_name(dim, tag, file)];
+      for (int entity : group_entities(dim, tag)) {
+        for (std::size_t q : elements_of_type(kQuad8, 2, entity, file).tags) region.push_back(element_number.at(q));
+      }
+      std::sort(region.begin(), region.end());
+    }
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Mesh gmsh_mesh(const std::string& file) {
+  if (!std::filesystem::is_regular_file(file)) throw UserError(fmt::format("{}: no such file; give a Gmsh mesh", file));
+  const GmshSession session;
+  try {
+    gmsh::open(file);
+    std::vector<int> types;
+    std::vector<std::vector<std::size_t>> elements, element_nodes;
+    gmsh::model::mesh::getElements(types, elements, element_nodes, 2);
+    if (types.empty() && std::filesystem::path(file).extension() == ".geo") gmsh::model::mesh::generate(2);
+    return read_model(file);
+  } catch (const UserError&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw UserError(
+        fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error.what()));
+  } catch (const std::string& error) {
+    throw UserError(fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error));
+  } catch (int) {
+    throw UserError(fmt::format("{}: Gmsh cannot read it; open it in Gmsh and export it again", file));
+  }
+}
+
+}  // namespace femxdem
