@@ -14,8 +14,105 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     remove(ve)
     info(ve) -> dict                   {"time_step": s, "time_scale": a sqrt(rho/p) s, "volume": m^3, "spheres": n,
                                         "mean_diameter": m, "mean_stress": Pa (compression positive)}
-    deform(ve, velocity_gradient, steps)   hold velocity_gradient (3, 3) [1/s] for `steps` DEM steps of info's time_step
+    deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's time_step:
+                                       the cell ends at (I + L time_step)^steps times where it was, stress and report
+                                       belong to exactly that end
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report; (9,) the cell's
                                        deformation gradient from the reference (adopted) state
     stiffness(ve, out_stiffness)       (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised [Pa]
 """
+
+import os
+import pickle
+import signal
+import time
+
+import numpy as np
+
+
+class DummyEngine:
+    """The protocol on a small-strain isotropic elastic cell: for tests of the bridge without YADE.
+
+    spec: youngs_modulus [Pa], poisson_ratio [-], confining_stress [Pa], and for tests of failures
+    `fault` = "none" | "segv" | "raise" | "hang", which strikes in a deform that ends beyond the stretch
+    `fault_strain` (largest |F - I|).
+    """
+
+    DEFAULTS = {
+        "youngs_modulus": 1e8,
+        "poisson_ratio": 0.25,
+        "confining_stress": 1e5,
+        "fault": "none",
+        "fault_strain": 0.0,
+    }
+    TIME_STEP = 1e-5
+
+    def __init__(self, report_fields):
+        self.report_fields = list(report_fields)
+        self.cells = {}
+
+    def versions(self):
+        return {"yade": "dummy", "numpy": np.__version__}
+
+    def make_template(self, spec):
+        cell = {**self.DEFAULTS, **spec, "F": np.eye(3), "steps": 0}
+        return {"state": pickle.dumps(cell), "manifest": {"source": "dummy"}}
+
+    def add(self, state):
+        ve = max(self.cells, default=-1) + 1
+        self.cells[ve] = pickle.loads(state)
+        return ve
+
+    def replace(self, ve, state):
+        self.cells[ve] = pickle.loads(state)
+
+    def save(self, ve):
+        return pickle.dumps(self.cells[ve])
+
+    def remove(self, ve):
+        del self.cells[ve]
+
+    def info(self, ve):
+        return {
+            "time_step": self.TIME_STEP,
+            "time_scale": 1e-3,
+            "volume": 1e-9,
+            "spheres": 1,
+            "mean_diameter": 1e-3,
+            "mean_stress": self.cells[ve]["confining_stress"],
+        }
+
+    def deform(self, ve, velocity_gradient, steps):
+        cell = self.cells[ve]
+        step = np.eye(3) + np.asarray(velocity_gradient).reshape(3, 3) * self.TIME_STEP
+        cell["F"] = np.linalg.matrix_power(step, steps) @ cell["F"]
+        cell["steps"] = steps
+        if cell["fault"] != "none" and np.abs(cell["F"] - np.eye(3)).max() > cell["fault_strain"]:
+            self._fault(ve, cell["fault"])
+
+    @staticmethod
+    def _fault(ve, kind):
+        if kind == "segv":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if kind == "hang":
+            time.sleep(3600)
+        raise RuntimeError(f"dummy cell {ve} failed on purpose (fault = {kind}); choose a smaller step.")
+
+    def stiffness(self, ve, out_stiffness):
+        cell = self.cells[ve]
+        E, nu = cell["youngs_modulus"], cell["poisson_ratio"]
+        lam, mu, d = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu)), np.eye(3)
+        C = lam * np.einsum("ij,kl->ijkl", d, d)
+        C += mu * (np.einsum("ik,jl->ijkl", d, d) + np.einsum("il,jk->ijkl", d, d))
+        out_stiffness[:] = C.ravel()
+
+    def measure(self, ve, out_stress, out_report, out_stretch):
+        cell = self.cells[ve]
+        C = np.empty(81)
+        self.stiffness(ve, C)
+        strain = (cell["F"] + cell["F"].T) / 2 - np.eye(3)
+        stress = np.einsum("ijkl,kl->ij", C.reshape(3, 3, 3, 3), strain) - cell["confining_stress"] * np.eye(3)
+        out_stress[:] = stress.ravel()
+        out_stretch[:] = cell["F"].ravel()
+        values = {"dem_steps": cell["steps"], "time_step": self.TIME_STEP, "contacts": 1}
+        out_report[:] = [values.get(name, 0.0) for name in self.report_fields]

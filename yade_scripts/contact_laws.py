@@ -1,0 +1,74 @@
+"""The contact laws of a prepared volume element, by constant stiffnesses kn, kt [N/m] over a polydisperse packing.
+
+"adhesive"  f_n = kn delta - f_c while the contact exists, |f_t| <= mu kn delta; sliding leaves the adhesion alone
+            (Gilabert, Roux, Castellanos 2007; the law of Nguyen et al. 2017). In tension YADE holds f_n = -f_c from
+            delta = 0 to delta = -f_c/kn, then the contact is lost for good.
+"bonded"    the same until the contact first slides or opens: then its adhesion is gone (YADE's `fragile`).
+"friction"  f_n = kn delta, |f_t| <= mu f_n: cheaper, no adhesion.
+
+Forces are compression positive, delta is the overlap.
+"""
+
+import math
+
+LAWS = ("adhesive", "bonded", "friction")
+
+
+def engines(law, kn, kt, damping):
+    """YADE's engine list for a periodic cell of spheres: contact detection, `law`, integrator."""
+    import yade.wrapper as y
+
+    if law == "friction":
+        constant = lambda value: y.MatchMaker(algo="val", val=value)
+        loop = y.InteractionLoop(
+            [y.Ig2_Sphere_Sphere_ScGeom()],
+            [y.Ip2_FrictMat_FrictMat_FrictPhys(kn=constant(kn), ks=constant(kt))],
+            [y.Law2_ScGeom_FrictPhys_CundallStrack()],
+        )
+    else:
+        loop = y.InteractionLoop(
+            [y.Ig2_Sphere_Sphere_ScGeom6D()],
+            [y.Ip2_CohFrictMat_CohFrictMat_CohFrictPhys(setCohesionNow=False, setCohesionOnNewContacts=False)],
+            [y.Law2_ScGeom6D_CohFrictPhys_CohesionMoment()],
+        )
+    return [
+        y.ForceResetter(),
+        y.InsertionSortCollider([y.Bo1_Sphere_Aabb()], verletDist=-0.1),
+        loop,
+        y.NewtonIntegrator(damping=damping),
+    ]
+
+
+def material(law, kn, kt, radius, density, friction):
+    """Material of a sphere of `radius` [m].
+
+    YADE's kn = 2 E1 r1 E2 r2 / (E1 r1 + E2 r2), so E = kn/r keeps kn the same for every pair; its "poisson" is kt/kn.
+    """
+    import yade.wrapper as y
+
+    values = {"young": kn / radius, "poisson": kt / kn, "frictionAngle": math.atan(friction), "density": density}
+    if law == "friction":
+        return y.FrictMat(**values)
+    return y.CohFrictMat(isCohesive=True, momentRotationLaw=False, normalCohesion=0, shearCohesion=0, **values)
+
+
+def set_friction(bodies, interactions, friction):
+    """Coulomb coefficient of all spheres and of all contacts there are."""
+    for b in bodies:
+        b.mat.frictionAngle = math.atan(friction)
+    for i in interactions:
+        i.phys.tangensOfFrictionAngle = friction
+
+
+def add_adhesion(interactions, f_c, friction, fragile):
+    """Gives every contact without adhesion the force f_c [N]; returns how many there were."""
+    count = 0
+    for i in interactions:
+        p = i.phys
+        if p.normalAdhesion > 0:
+            continue
+        p.unp, p.unpMax = f_c / p.kn, 0.0
+        p.normalAdhesion, p.shearAdhesion = f_c, friction * f_c
+        p.cohesionBroken, p.fragile = False, fragile
+        count += 1
+    return count

@@ -1,0 +1,156 @@
+"""Volume elements made from dimensionless groups: a periodic cell of spheres under isotropic stress."""
+
+import math
+import time
+
+import numpy as np
+
+import contact_laws
+
+DEFAULTS = {
+    "spheres": 100,
+    "size_ratio": 1.5,  # d_max/d_min, diameters uniform between them
+    "kappa": 500.0,  # kn/(sigma_0 a)
+    "stiffness_ratio": 1.0,  # kn/kt
+    "friction": 0.5,
+    "compaction_friction": 0.0,  # friction while the packing is made: 0 is the densest
+    "cohesion": 0.0,  # p* = f_c/(sigma_0 a^2)
+    "contact_law": "adhesive",
+    "confining_stress": 1e5,  # sigma_0 [Pa]
+    "mean_diameter": 1e-3,  # a [m]
+    "density": 2600.0,  # of the grains [kg/m^3]
+    "damping": 0.2,  # YADE's non-viscous damping, while the VE is strained
+    "seed": 1,
+}
+COMPACTION_DAMPING = 0.5
+STRESS_TOLERANCE = 5e-4  # of sigma_0, each component
+UNBALANCED_TOLERANCE = 5e-5
+MAX_STEPS = 400_000
+
+
+def prepare(O, spec):
+    """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest.
+
+    The radii are smaller by f_c/(2 kn) until the adhesion is put in: restoring them moves every overlap by f_c/kn,
+    which balances -f_c, so that the packing is already near its adhesive equilibrium.
+    Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
+    """
+    p = _checked({**DEFAULTS, **spec})
+    rng = np.random.default_rng(p["seed"])
+    sigma, a = p["confining_stress"], p["mean_diameter"]
+    kn, f_c = p["kappa"] * sigma * a, p["cohesion"] * sigma * a * a
+    diameters = rng.uniform(1.0, p["size_ratio"], p["spheres"])
+    radii = 0.5 * a * diameters / diameters.mean()
+    _loose_cell(O, p, kn, radii, radii - 0.5 * f_c / kn, rng)
+    O.dt = 0.2 * math.sqrt(O.bodies[int(np.argmin(radii))].state.mass / kn)
+    servo = _Servo(O, p, kn)
+    servo.compact()
+    servo.settle()
+    contact_laws.set_friction(O.bodies, O.interactions, p["friction"])
+    if f_c > 0:
+        _restore_radii(O, radii, kn, p["density"])
+        O.step()
+        while contact_laws.add_adhesion(O.interactions, f_c, p["friction"], p["contact_law"] == "bonded"):
+            servo.settle()
+    servo.settle()
+    O.engines[-1].damping = p["damping"]
+
+
+def _checked(p):
+    if p["contact_law"] not in contact_laws.LAWS:
+        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {', '.join(contact_laws.LAWS)}.")
+    if p["cohesion"] > 0 and p["contact_law"] == "friction":
+        raise ValueError("ve.cohesion > 0 needs ve.contact_law = \"adhesive\" or \"bonded\"; \"friction\" has none.")
+    if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
+        raise ValueError("ve: spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0 are needed.")
+    return p
+
+
+def _loose_cell(O, p, kn, radii, small_radii, rng):
+    """Spheres at random, without contact, at a solid fraction of 0.3, in a cube that fits them."""
+    from yade.utils import Matrix3, sphere
+
+    side = (4 / 3 * math.pi * (radii**3).sum() / 0.3) ** (1 / 3)
+    O.periodic = True
+    O.cell.hSize = Matrix3(side, 0, 0, 0, side, 0, 0, 0, side)
+    law, kt = p["contact_law"], kn / p["stiffness_ratio"]
+    O.engines = contact_laws.engines(law, kn, kt, COMPACTION_DAMPING)
+    for x, r in zip(_random_positions(rng, radii, side), small_radii):
+        mat = contact_laws.material(law, kn, kt, r, p["density"], p["compaction_friction"])
+        O.bodies.append(sphere(tuple(x), r, material=mat))
+
+
+def _random_positions(rng, radii, side):
+    """Random sequential addition in a periodic cube, the largest first."""
+    positions = np.empty((len(radii), 3))
+    placed = np.empty(0, dtype=int)
+    for i in np.argsort(-radii, kind="stable"):
+        while True:
+            x = rng.uniform(0, side, 3)
+            d = positions[placed] - x
+            d -= side * np.round(d / side)
+            if (np.einsum("ij,ij->i", d, d) > (radii[placed] + radii[i]) ** 2).all():
+                break
+        positions[i] = x
+        placed = np.append(placed, i)
+    return positions
+
+
+def _restore_radii(O, radii, kn, density):
+    for b, r in zip(O.bodies, radii):
+        mass = 4 / 3 * math.pi * r**3 * density
+        b.shape.radius = r
+        b.mat.young = kn / r
+        b.state.mass = mass
+        b.state.inertia = (0.4 * mass * r * r,) * 3
+
+
+class _Servo:
+    """Drives the periodic cell, all six components, to the isotropic stress -sigma_0."""
+
+    EVERY = 10  # steps between two looks at the stress
+
+    def __init__(self, O, p, kn):
+        from yade._utils import getStress, unbalancedForce
+
+        self.O, self.sigma = O, p["confining_stress"]
+        self.stress, self.unbalanced = getStress, unbalancedForce
+        self.bulk_modulus = 0.4 * kn / p["mean_diameter"]  # of a dense packing
+        self.relaxation = 200 * O.dt
+        self.rate = 0.02 * math.sqrt(self.sigma / p["density"]) / p["mean_diameter"]  # inertial number 0.02
+        self.steps = 0
+
+    def _strain(self, rate):
+        from yade.utils import Matrix3
+
+        self.O.cell.velGrad = Matrix3(*rate.ravel())
+        for _ in range(self.EVERY):
+            self.O.step()
+        self.steps += self.EVERY
+        if self.steps > MAX_STEPS:
+            raise RuntimeError(
+                f"The packing is not in equilibrium after {MAX_STEPS} steps (unbalanced force {self.unbalanced():.1e}, "
+                f"limit {UNBALANCED_TOLERANCE:.0e}): try another ve.seed, a lower ve.kappa or more ve.spheres."
+            )
+
+    def error(self):
+        """Symmetric stress above the target, over sigma_0."""
+        s = np.array(self.stress()).reshape(3, 3)
+        return (s + s.T) / (2 * self.sigma) + np.eye(3)
+
+    def compact(self):
+        """Isotropic compression of the loose cell until it carries a tenth of sigma_0."""
+        while np.trace(self.error()) > 3 * 0.9:
+            self._strain(-self.rate * np.eye(3))
+
+    def settle(self):
+        """Until the stress is on target and the spheres are at rest."""
+        while True:
+            e = self.error()
+            if np.abs(e).max() < STRESS_TOLERANCE:
+                if self.unbalanced() < UNBALANCED_TOLERANCE:
+                    break
+                e[:] = 0
+            rate = -e * self.sigma / (self.bulk_modulus * self.relaxation)
+            self._strain(np.clip(rate, -self.rate, self.rate))
+        self._strain(np.zeros((3, 3)))
