@@ -60,6 +60,15 @@ void synchronise(const std::filesystem::path& file) {
   close(descriptor);
 }
 
+void refuse_other_case(const std::filesystem::path& file, const Hdf5File& h5, const std::string& case_hash) {
+  const std::string theirs = h5.text("/", "case_hash");
+  if (theirs == case_hash) return;
+  throw UserError(fmt::format(
+      "{}: belongs to another case (hash {}, this case has {}); restart with the case it was written by or choose "
+      "another --out",
+      file.string(), theirs, case_hash));
+}
+
 void refuse_other_versions(const std::filesystem::path& file, const Hdf5File& h5,
                            const std::map<std::string, std::string>& versions) {
   const std::vector<std::string> written_with = h5.attributes("/versions");
@@ -72,6 +81,21 @@ void refuse_other_versions(const std::filesystem::path& file, const Hdf5File& h5
         "written with or start without --restart",
         file.string(), name, theirs, version));
   }
+}
+
+Checkpoint read_contents(const Hdf5File& h5) {
+  Checkpoint checkpoint;
+  checkpoint.step = static_cast<int>(h5.number("/", "step"));
+  checkpoint.time = h5.number("/", "time");
+  checkpoint.dt = h5.number("/", "dt");
+  checkpoint.case_hash = h5.text("/", "case_hash");
+  for (const std::string& name : h5.attributes("/versions")) checkpoint.versions[name] = h5.text("/versions", name);
+  for (const std::string& order : h5.members("/arrays")) {
+    const std::string group = "/arrays/" + order;
+    checkpoint.arrays.emplace_back(h5.text(group, "name"), h5.read(group + "/values"));
+  }
+  checkpoint.states = read_states(h5);
+  return checkpoint;
 }
 
 }  // namespace
@@ -96,26 +120,14 @@ Checkpoint read_checkpoint(const std::filesystem::path& file, const std::string&
   if (!std::filesystem::exists(file)) {
     throw UserError(fmt::format("{}: no checkpoint to restart from; start without --restart", file.string()));
   }
-  const Hdf5File h5(file, Hdf5File::Mode::read);
-  Checkpoint checkpoint;
-  checkpoint.case_hash = h5.text("/", "case_hash");
-  if (checkpoint.case_hash != case_hash) {
-    throw UserError(fmt::format(
-        "{}: belongs to another case (hash {}, this case has {}); restart with the case it was written by or choose "
-        "another --out",
-        file.string(), checkpoint.case_hash, case_hash));
+  try {
+    const Hdf5File h5(file, Hdf5File::Mode::read);
+    refuse_other_case(file, h5, case_hash);
+    refuse_other_versions(file, h5, versions);
+    return read_contents(h5);
+  } catch (const Hdf5Error&) {
+    throw UserError(fmt::format("{}: is not a whole checkpoint; start without --restart", file.string()));
   }
-  refuse_other_versions(file, h5, versions);
-  checkpoint.step = static_cast<int>(h5.number("/", "step"));
-  checkpoint.time = h5.number("/", "time");
-  checkpoint.dt = h5.number("/", "dt");
-  for (const std::string& name : h5.attributes("/versions")) checkpoint.versions[name] = h5.text("/versions", name);
-  for (const std::string& order : h5.members("/arrays")) {
-    const std::string group = "/arrays/" + order;
-    checkpoint.arrays.emplace_back(h5.text(group, "name"), h5.read(group + "/values"));
-  }
-  checkpoint.states = read_states(h5);
-  return checkpoint;
 }
 
 }  // namespace femxdem

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 namespace femxdem {
@@ -62,7 +61,7 @@ Hdf5File::~Hdf5File() {
 }
 
 void Hdf5File::fail(std::string_view what, std::string_view path) const {
-  throw std::runtime_error(fmt::format("{}: {} ({})", file_.string(), what, path));
+  throw Hdf5Error(fmt::format("{}: {} ({})", file_.string(), what, path));
 }
 
 void Hdf5File::write_raw(const std::string& path, const void* values, std::size_t count, const Shape& shape,

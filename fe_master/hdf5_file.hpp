@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +13,11 @@ namespace femxdem {
 /// Lengths of a data set along its axes, slowest first.
 using Shape = std::vector<std::size_t>;
 
-/// An HDF5 file, open as long as the object lives. Every failure is a std::runtime_error that names file and data set.
+struct Hdf5Error : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// An HDF5 file, open as long as the object lives. Every failure is an Hdf5Error that names file and data set.
 /// Paths inside the file start with '/'; missing groups on the way are made.
 class Hdf5File {
  public:
