@@ -10,6 +10,7 @@
 namespace femxdem {
 
 Element::Element(const Mesh& mesh) : mesh_(mesh) {
+  committed_ = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(mesh.nodes.size()));
   shapes_.reserve(mesh.elements.size() * kPointsPerElement);
   for (std::size_t e = 0; e < mesh.elements.size(); ++e) {
     Eigen::Matrix<double, 8, 2> X;
@@ -88,12 +89,14 @@ Eigen::MatrixXd Element::matrix(int e, const Eigen::VectorXd& /*x*/, std::span<c
   return K;
 }
 
-void Element::extrapolate(Eigen::VectorXd& x, double factor) const {
+void Element::begin_step(Eigen::VectorXd& x) { x = committed_; }
+
+void Element::extrapolate(Eigen::VectorXd& x, double factor) {
   if (last_increment_.size() == x.size()) x += factor * last_increment_;
 }
 
 void Element::commit(const Eigen::VectorXd& x) {
-  last_increment_ = committed_.size() == x.size() ? Eigen::VectorXd(x - committed_) : x;
+  last_increment_ = x - committed_;
   committed_ = x;
 }
 

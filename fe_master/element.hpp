@@ -56,19 +56,21 @@ class Element {
   /// Internal force of element e for the Cauchy stresses of its four points [Pa].
   virtual Eigen::VectorXd force(int e, const Eigen::VectorXd& x, std::span<const Tensor2> F,
                                 std::span<const Tensor2> stress) const;
+  /// What the constraints add to the force of element e on the right-hand side of a correction: r g of the augmented
+  /// Lagrangian; empty without constraints.
+  virtual Eigen::VectorXd constraint_force(int /*e*/, const Eigen::VectorXd& /*x*/) const { return {}; }
   /// Matrix of element e from dP/dF (Tensor4) of its four points; `exact` keeps the unsymmetric terms of the
   /// second-gradient part.
   virtual Eigen::MatrixXd matrix(int e, const Eigen::VectorXd& x, std::span<const Tensor2> F,
                                  std::span<const Tensor4> dPdF, bool exact) const;
 
-  /// Start of a load step from the committed state; returns to it after a rejected step. x is changed where unknowns
-  /// are counted from the start of the step.
-  virtual void begin_step(Eigen::VectorXd& /*x*/) {}
+  /// Start of a load step, also after a rejected one: x becomes the committed unknowns (increments are 0 there).
+  virtual void begin_step(Eigen::VectorXd& x);
   /// Multipliers after the unknowns have changed to x.
   virtual void update_multipliers(const Eigen::VectorXd& /*x*/) {}
   /// Extrapolates the unknowns and multipliers of the last step, factor times, onto x (set to the committed ones
   /// before).
-  virtual void extrapolate(Eigen::VectorXd& x, double factor) const;
+  virtual void extrapolate(Eigen::VectorXd& x, double factor);
   /// The trial state at x becomes the committed one.
   virtual void commit(const Eigen::VectorXd& x);
   /// Largest violation of the constraints against the step's own increment [-]; 0 without constraints.

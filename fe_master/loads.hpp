@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "case.hpp"
+#include "element.hpp"
+
+namespace femxdem {
+
+/// Boundary conditions and external forces of a mesh.
+class Loads {
+ public:
+  /// Loads of a case on the elements' mesh. A later displacement of the same unknown replaces an earlier one.
+  Loads(const Case& c, const Element& element);
+  /// No loads yet: constraints are added by hand (tests, closed forms). end_time [s].
+  explicit Loads(const Element& element, double end_time = 1);
+
+  /// Prescribes unknown `dof` as a function of time [s]; for micro-gradient unknowns the accumulated value.
+  void prescribe(int dof, std::function<double(double)> value);
+  /// Prescribed unknowns, ascending.
+  std::vector<int> prescribed_dofs() const;
+  /// Values of the prescribed unknowns (order of prescribed_dofs) at time t of a step that starts at t_n: total
+  /// displacements [m], increments of the micro gradient [-].
+  Eigen::VectorXd prescribed(double t_n, double t) const;
+  /// Nodal forces of tractions, follower pressures and body forces at time t on the configuration x [N/m].
+  Eigen::VectorXd external_force(const Eigen::VectorXd& x, double t) const;
+
+  /// Force per current volume [N/m^3].
+  BodyForce body_force;
+
+ private:
+  void add(const Load& load, const Element& element);
+  void add_edge_force(const Load& load, const Eigen::VectorXd& x, double factor, Eigen::VectorXd& f) const;
+
+  struct Prescribed {
+    int dof;
+    std::function<double(double)> value;
+  };
+  const Element& element_;
+  double end_time_;
+  std::vector<Prescribed> prescribed_;  // ascending in dof
+  std::vector<Load> forces_;            // tractions and pressures
+};
+
+/// Nodes of a named edge, each once, in order along it.
+std::vector<int> edge_nodes(const Mesh& mesh, const std::string& edge);
+
+}  // namespace femxdem

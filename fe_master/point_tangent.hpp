@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "element.hpp"
+#include "tensor.hpp"
+
+namespace femxdem {
+
+/// dP/dF (row 3 i + J, column 3 k + L) from c = d sigma / d(spatial gradient): exact, unsymmetric in general [Pa].
+Tensor4 piola_tangent(const Tensor4& c, const Tensor2& stress, const Tensor2& F);
+
+/// dP/dF of the elastic operator alone, J C : (dF F^-1) F^-T, without the terms of the current stress: symmetric [Pa].
+Tensor4 piola_elastic(const Tensor4& C, const Tensor2& F);
+
+/// dP/dF of a law sigma = R s(U) R^T, F = R U, with ds = C : sym(dU U_n^-1): exact, unsymmetric in general [Pa].
+/// U_n: right stretch at the start of the step, from which C counts strain.
+Tensor4 piola_corotational(const Tensor4& C, const Tensor2& stress, const Tensor2& F, const Tensor2& U_n);
+
+/// Components of strain that a formulation can produce, in Mandel form: index 0 to 5 is 11, 22, 33, 23, 13, 12.
+using StrainComponents = std::vector<int>;
+/// Plane strain: 11, 22, 12.
+inline const StrainComponents kPlaneStrain = {0, 1, 5};
+
+using MandelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+using MandelVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;
+
+/// Symmetric tensor in Mandel form (shear times sqrt(2)), chosen components.
+MandelVector to_mandel(const Tensor2& T, const StrainComponents& components);
+MandelMatrix to_mandel(const Tensor4& C, const StrainComponents& components);
+/// Back; the components not chosen are 0.
+Tensor4 from_mandel(const MandelMatrix& C, const StrainComponents& components);
+
+/// Bounds and thresholds of a learned tangent.
+struct LearningLimits {
+  double min = 0.02;    ///< least eigenvalue of its symmetric part in the elastic metric [-]
+  double max = 1.2;     ///< largest one [-]
+  double skew = 0.6;    ///< largest norm of its skew part [-]
+  double noise = 1e-6;  ///< change of strain below which nothing is learned [-]
+};
+
+/// Tangent of one material point, learned from the responses that it has given: elastic at first, then a rank-one
+/// secant update from each pair of successive trials, C <- C + (y - C s) s^T / (s^T s), kept between steps. It lives in
+/// the frame of the stretch, s = sym(U U_n^-1) and y = R^T sigma R, so that objectivity is exact; bounded in the
+/// elastic metric. (Broyden 1965; partitioned as in Griewank and Toint 1982, a Gauss point being a partition.)
+class LearnedTangent {
+ public:
+  LearnedTangent(const Tensor4& elastic, const StrainComponents& components, const LearningLimits& limits);
+
+  /// Start of a step from the committed F and stress.
+  void begin_step(const Tensor2& F, const Tensor2& stress);
+  /// Response of a trial of this step.
+  void learn(const Tensor2& F, const Tensor2& stress);
+  /// dP/dF at a trial [Pa].
+  Tensor4 piola(const Tensor2& F, const Tensor2& stress) const;
+  /// Smallest eigenvalue of the symmetric part over that of elasticity [-]: below 0 the point softens.
+  double least_eigenvalue() const;
+
+  void save(std::vector<double>& values) const;
+  /// Takes its values from `values` at `position`, which advances.
+  void load(const std::vector<double>& values, std::size_t& position);
+
+ private:
+  void bound();
+
+  StrainComponents components_;
+  LearningLimits limits_;
+  MandelMatrix cholesky_;  // L of the elastic stiffness C0 = L L^T
+  MandelMatrix C_;
+  Tensor2 U_n_ = Tensor2::Identity();
+  MandelVector strain_, stress_;  // of the last trial, in the frame of the stretch
+};
+
+}  // namespace femxdem
