@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "errors.hpp"
 #include "objective_update.hpp"
@@ -11,16 +12,11 @@
 namespace femxdem {
 namespace {
 
-template <class... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
-
 Lame lame(double young, double poisson) {
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
 
-/// c with alpha = c tan(phi), k = 3 c cohesion: Drucker-Prager's cone along Mohr-Coulomb's surface in plane strain.
+/// 1 / sqrt(9 + 12 tan^2): Drucker-Prager's cone along Mohr-Coulomb's surface in plane strain.
 double plane_strain_match(double angle) { return 1 / std::sqrt(9 + 12 * std::pow(std::tan(angle), 2)); }
 
 Cone cone(const JaumannLaw&) { return {}; }
@@ -143,39 +139,42 @@ void check_softening(const Law& law) {
                                  law.hardening, law.hardening / ratio));
 }
 
+void check_law(const ElasticLaw& law) { check_elastic(law); }
+
+void check_law(const JaumannLaw& law) { check_elastic(law); }
+
+void check_law(const FailingLaw& law) { check_elastic(law); }
+
+void check_law(const VonMisesLaw& law) {
+  check_softening(law);
+  require(law.yield_stress > 0, fmt::format("yield_stress = {} must be positive", law.yield_stress));
+}
+
+void check_law(const DruckerPragerLaw& law) {
+  check_softening(law);
+  require(law.cohesion >= 0, fmt::format("cohesion = {} must not be negative", law.cohesion));
+  require(law.friction_angle >= 0 && law.friction_angle < std::numbers::pi / 2,
+          fmt::format("friction_angle = {} rad must lie between 0 and pi/2", law.friction_angle));
+  require(std::abs(law.dilatancy_angle) <= law.friction_angle,
+          fmt::format("dilatancy_angle = {} rad must not exceed friction_angle = {} rad", law.dilatancy_angle,
+                      law.friction_angle));
+}
+
+void check_law(const BilinearLaw& law) {
+  require(law.A1 > 0, fmt::format("A1 = {} must be positive", law.A1));
+  require(law.A2 < law.A1, fmt::format("A2 = {} must be below A1 = {}", law.A2, law.A1));
+  require(law.e_l > 0, fmt::format("e_l = {} must be positive", law.e_l));
+  require(law.smoothing >= 0 && law.smoothing < law.e_l,
+          fmt::format("smoothing = {} must lie between 0 and e_l = {}", law.smoothing, law.e_l));
+  require(law.residual_stress >= 0 && law.residual_stress < law.A1 * law.e_l,
+          fmt::format("residual_stress = {} must lie between 0 and the peak A1 e_l = {}", law.residual_stress,
+                      law.A1 * law.e_l));
+}
+
 }  // namespace
 
 void check(const AnalyticLaw& law) {
-  const double right_angle = std::acos(0.0);
-  std::visit(Overloaded{
-                 [](const ElasticLaw& l) { check_elastic(l); },
-                 [](const JaumannLaw& l) { check_elastic(l); },
-                 [](const VonMisesLaw& l) {
-                   check_softening(l);
-                   require(l.yield_stress > 0, fmt::format("yield_stress = {} must be positive", l.yield_stress));
-                 },
-                 [&](const DruckerPragerLaw& l) {
-                   check_softening(l);
-                   require(l.cohesion >= 0, fmt::format("cohesion = {} must not be negative", l.cohesion));
-                   require(l.friction_angle >= 0 && l.friction_angle < right_angle,
-                           fmt::format("friction_angle = {} rad must lie between 0 and pi/2", l.friction_angle));
-                   require(std::abs(l.dilatancy_angle) <= l.friction_angle,
-                           fmt::format("dilatancy_angle = {} rad must not exceed friction_angle = {} rad",
-                                       l.dilatancy_angle, l.friction_angle));
-                 },
-                 [](const BilinearLaw& l) {
-                   require(l.A1 > 0, fmt::format("A1 = {} must be positive", l.A1));
-                   require(l.A2 < l.A1, fmt::format("A2 = {} must be below A1 = {}", l.A2, l.A1));
-                   require(l.e_l > 0, fmt::format("e_l = {} must be positive", l.e_l));
-                   require(l.smoothing >= 0 && l.smoothing < l.e_l,
-                           fmt::format("smoothing = {} must lie between 0 and e_l = {}", l.smoothing, l.e_l));
-                   require(l.residual_stress >= 0 && l.residual_stress < l.A1 * l.e_l,
-                           fmt::format("residual_stress = {} must lie between 0 and the peak A1 e_l = {}",
-                                       l.residual_stress, l.A1 * l.e_l));
-                 },
-                 [](const FailingLaw& l) { check_elastic(l); },
-             },
-             law);
+  std::visit([](const auto& l) { check_law(l); }, law);
 }
 
 LawState initial_state(const AnalyticLaw& law) {
