@@ -124,18 +124,24 @@ void LearnedTangent::begin_step(const Tensor2& F, const Tensor2& stress) {
   const auto [R, U] = polar_decomposition(F);
   U_n_ = U;
   strain_ = MandelVector::Zero(static_cast<int>(components_.size()));
-  stress_ = to_mandel(Tensor2(R.transpose() * stress * R), components_);
+  stress_ = unrotated(stress, R);
+}
+
+MandelVector LearnedTangent::strain(const Tensor2& U) const {
+  return to_mandel(Tensor2(U * U_n_.inverse() - Tensor2::Identity()), components_);
+}
+
+MandelVector LearnedTangent::unrotated(const Tensor2& stress, const Tensor2& R) const {
+  return to_mandel(Tensor2(R.transpose() * stress * R), components_);
 }
 
 void LearnedTangent::learn(const Tensor2& F, const Tensor2& stress) {
   const auto [R, U] = polar_decomposition(F);
-  const MandelVector strain = to_mandel(Tensor2(U * U_n_.inverse() - Tensor2::Identity()), components_);
-  const MandelVector rotated = to_mandel(Tensor2(R.transpose() * stress * R), components_);
-  const MandelVector s = strain - strain_;
-  const MandelVector y = rotated - stress_;
+  const MandelVector s = strain(U) - strain_;
+  const MandelVector y = unrotated(stress, R) - stress_;
   if (s.norm() < limits_.noise) return;
-  strain_ = strain;
-  stress_ = rotated;
+  strain_ += s;
+  stress_ += y;
   C_ += (y - C_ * s) * s.transpose() / s.squaredNorm();
   bound();
 }
@@ -152,6 +158,30 @@ void LearnedTangent::bound() {
   for (double& value : values) value = std::clamp(value, limits_.min, limits_.max);
   const MandelMatrix bounded = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose() + skew;
   C_ = cholesky_ * bounded * cholesky_.transpose();
+}
+
+StrainProbe LearnedTangent::start_probe(const Tensor2& F, const Tensor2& stress, double size) const {
+  const auto [R, U] = polar_decomposition(F);
+  const int n = static_cast<int>(components_.size());
+  return {size, strain(U), unrotated(stress, R), MandelMatrix(n, n), MandelMatrix(n, n)};
+}
+
+Tensor2 LearnedTangent::probe(const StrainProbe& probe, const Tensor2& F, int component) const {
+  const auto [R, U] = polar_decomposition(F);
+  const auto [i, j] = kMandel[components_[component]];
+  Tensor2 e = Tensor2::Zero();
+  e(i, j) = e(j, i) = probe.size / mandel_factor(components_[component]);
+  return R * (U + e * U_n_);
+}
+
+void LearnedTangent::record(StrainProbe& probe, const Tensor2& probed_F, const Tensor2& stress, int component) const {
+  const auto [R, U] = polar_decomposition(probed_F);
+  probe.strains.col(component) = strain(U) - probe.strain;
+  probe.stresses.col(component) = unrotated(stress, R) - probe.stress;
+}
+
+void LearnedTangent::finish_probe(const StrainProbe& probe) {
+  C_ = probe.stresses * MandelMatrix(probe.strains).inverse();
 }
 
 Tensor4 LearnedTangent::piola(const Tensor2& F, const Tensor2& stress) const {

@@ -40,6 +40,13 @@ struct LearningLimits {
   double noise = 1e-6;  ///< change of strain below which nothing is learned [-]
 };
 
+/// Finite-difference probes of one point: changes of strain and of stress, one column a component.
+struct StrainProbe {
+  double size = 0;
+  MandelVector strain, stress;  ///< of the trial that is probed, in the frame of the stretch
+  MandelMatrix strains, stresses;
+};
+
 /// Tangent of one material point, learned from the responses that it has given: elastic at first, then a rank-one
 /// secant update from each pair of successive trials, C <- C + (y - C s) s^T / (s^T s), kept between steps. It lives in
 /// the frame of the stretch, s = sym(U U_n^-1) and y = R^T sigma R, so that objectivity is exact; bounded in the
@@ -52,6 +59,11 @@ class LearnedTangent {
   void begin_step(const Tensor2& F, const Tensor2& stress);
   /// Response of a trial of this step.
   void learn(const Tensor2& F, const Tensor2& stress);
+  /// Probes about a trial: start, one F for each component, its answer, and the tangent from all answers (no bounds).
+  StrainProbe start_probe(const Tensor2& F, const Tensor2& stress, double size) const;
+  Tensor2 probe(const StrainProbe& probe, const Tensor2& F, int component) const;
+  void record(StrainProbe& probe, const Tensor2& probed_F, const Tensor2& stress, int component) const;
+  void finish_probe(const StrainProbe& probe);
   /// dP/dF at a trial [Pa].
   Tensor4 piola(const Tensor2& F, const Tensor2& stress) const;
   /// Smallest eigenvalue of the symmetric part over that of elasticity [-]: below 0 the point softens.
@@ -62,6 +74,8 @@ class LearnedTangent {
   void load(const std::vector<double>& values, std::size_t& position);
 
  private:
+  MandelVector strain(const Tensor2& U) const;  // sym(U U_n^-1) - I
+  MandelVector unrotated(const Tensor2& stress, const Tensor2& R) const;
   void bound();
 
   StrainComponents components_;
