@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import dataclass
 from datetime import datetime, timezone
 
 import numpy as np
@@ -13,6 +14,26 @@ import yade_modules
 from time_step import critical_time_step
 
 DEFAULTS = {"source": "prepare", "time_step_safety": 0.8}
+
+
+@dataclass
+class _Trial:
+    """The last deform of a VE."""
+
+    steps: int = 0
+    engine_seconds: float = 0.0
+    seconds: float = 0.0
+    rate: float = 0.0  # norm of the strain rate [1/s]
+
+
+@dataclass
+class _Grains:
+    """What does not change while a VE lives."""
+
+    radius: np.ndarray  # (n,) [m]; 0 for a body that is no sphere
+    solid_volume: float  # [m^3]
+    mean_diameter: float  # [m]
+    density: float  # [kg/m^3]
 
 
 class Engine:
@@ -27,8 +48,7 @@ class Engine:
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
         self.report_fields = list(report_fields)
-        self._free = []
-        self._last = {}
+        self._free, self._trial, self._grains = [], {}, {}
 
     def versions(self):
         return yade_modules.versions()
@@ -43,7 +63,10 @@ class Engine:
         manifest = {"source": spec["source"], **adoption.adopt(self.O)}
         self.O.dt = spec["time_step_safety"] * critical_time_step(self.O, contact_loop.contacts(self.O))
         self._to_forces()
-        manifest.update(self._describe(0), versions=self.versions(), seconds=time.perf_counter() - started)
+        grains = _grains(self.O)
+        manifest.update(self._geometry(grains), **self._state_of_contacts(grains))
+        manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
+        manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
         return {"state": self.O.sceneToString(), "manifest": manifest}
 
@@ -56,11 +79,12 @@ class Engine:
         self._select(ve)
         O = self.O
         O.stringToScene(state)
+        O.forces.reset()
         time_step, O.dt = O.dt, 0.0
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         self._to_forces()
         O.dt = time_step
-        self._last[ve] = (0, 0.0, 0.0, 0.0)
+        self._trial[ve], self._grains[ve] = _Trial(), _grains(O)
 
     def save(self, ve):
         self._select(ve)
@@ -70,12 +94,11 @@ class Engine:
         self._select(ve)
         self.O.resetCurrentScene()
         self._free.append(ve)
-        del self._last[ve]
+        del self._trial[ve], self._grains[ve]
 
     def info(self, ve):
         self._select(ve)
-        d = self._describe(ve)
-        return {k: d[k] for k in ("time_step", "time_scale", "volume", "spheres", "mean_diameter", "mean_stress")}
+        return self._geometry(self._grains[ve])
 
     def deform(self, ve, velocity_gradient, steps):
         self._select(ve)
@@ -88,27 +111,33 @@ class Engine:
             step()
         self._to_forces()
         now = time.perf_counter()
-        rate = np.linalg.norm(L + L.T) / 2
-        self._last[ve] = (steps, now - before, now - started, rate)
+        self._trial[ve] = _Trial(steps, now - before, now - started, float(np.linalg.norm(L + L.T)) / 2)
 
     def measure(self, ve, out_stress, out_report, out_stretch):
         started = time.perf_counter()
         self._select(ve)
+        trial, grains = self._trial[ve], self._grains[ve]
         s = np.array(self._utils.getStress()).reshape(3, 3)
         out_stress[:] = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
-        steps, engine_seconds, seconds, rate = self._last[ve]
-        values = self._describe(ve)
-        values["dem_steps"], values["engine_seconds"] = steps, engine_seconds
-        values["inertial_number"] = rate * values["time_scale"]
-        values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / (2 * np.linalg.norm(s)))
-        values["seconds"] = seconds + time.perf_counter() - started
+        values = self._state_of_contacts(grains)
+        pressure = -np.trace(s) / 3
+        values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
+        values["time_step"] = self.O.dt
+        values["inertial_number"] = trial.rate * _time_scale(grains, pressure)
+        values["mean_rotation"] = float(np.mean([b.state.rot().norm() for b in self.O.bodies]))
+        values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
+        values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
+        for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
+            values["fabric_" + name] = f
+        values["seconds"] = trial.seconds + time.perf_counter() - started
         out_report[:] = [values.get(name, 0.0) for name in self.report_fields]
 
     def stiffness(self, ve, out_stiffness):
         self._select(ve)
         c = contact_loop.contacts(self.O)
-        out_stiffness[:] = contact_loop.stiffness(c, self.O.cell.volume).ravel()
+        kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
+        out_stiffness[:] = contact_loop.stiffness(c, kn, kt, self.O.cell.volume).ravel()
 
     def _select(self, ve):
         if self.O.thisScene != ve:
@@ -122,22 +151,42 @@ class Engine:
             O.step()
         O.subStepping = False
 
-    def _describe(self, ve):
-        """Numbers of the current scene."""
-        O, u = self.O, self._utils
-        pressure = -np.trace(np.array(u.getStress()).reshape(3, 3)) / 3
-        diameters = np.array([2 * b.shape.radius for b in O.bodies])
-        a, density = diameters.mean(), O.bodies[0].mat.density
-        m = O.interactions.countReal()
+    def _geometry(self, grains):
+        """The numbers of protocol.py's info()."""
+        pressure = -np.trace(np.array(self._utils.getStress()).reshape(3, 3)) / 3
         return {
-            "time_step": O.dt,
-            "time_scale": a * math.sqrt(density / pressure) if pressure > 0 else math.inf,
-            "volume": O.cell.volume,
-            "spheres": len(O.bodies),
-            "mean_diameter": a,
-            "mean_stress": pressure,
-            "porosity": 1 - math.pi / 6 * (diameters**3).sum() / O.cell.volume,
-            "coordination": 2 * m / len(O.bodies),
-            "contacts": m,
-            "unbalanced_force": u.unbalancedForce(),
+            "time_step": self.O.dt,
+            "time_scale": _time_scale(grains, pressure),
+            "volume": self.O.cell.volume,
+            "spheres": len(self.O.bodies),
+            "mean_diameter": grains.mean_diameter,
+            "mean_stress": float(pressure),
         }
+
+    def _state_of_contacts(self, grains):
+        """The numbers of a report that follow from the contacts."""
+        c = contact_loop.contacts(self.O)
+        m, n = len(c.phys), len(self.O.bodies)
+        per_grain = np.bincount(c.ids.ravel(), minlength=n)
+        backbone = per_grain[per_grain > 1]
+        return {
+            "contacts": m,
+            "coordination": 2 * m / n,
+            "coordination_backbone": float(backbone.mean()) if len(backbone) else 0.0,
+            "fabric": contact_loop.fabric(c, np.full(m, 1 / max(m, 1))).tolist(),
+            "sliding_contacts": float(contact_loop.at_coulomb_limit(c, grains.radius).sum()) / max(m, 1),
+            "adhesive_contacts": float(contact_loop.adhesive(c).sum()) / max(m, 1),
+            "unbalanced_force": self._utils.unbalancedForce(),
+        }
+
+
+def _grains(O):
+    radius = np.array([getattr(b.shape, "radius", 0.0) for b in O.bodies])
+    solid = 4 / 3 * math.pi * float((radius**3).sum())
+    mass = sum(b.state.mass for b in O.bodies)
+    return _Grains(radius, solid, 2 * float(radius.mean()), mass / solid)
+
+
+def _time_scale(grains, pressure):
+    """a sqrt(rho/p) [s]; without pressure no rate is slow."""
+    return grains.mean_diameter * math.sqrt(grains.density / pressure) if pressure > 0 else math.inf
