@@ -25,9 +25,4 @@ double min_acoustic_determinant(const Tensor4& tangent, double* inclination) {
   return smallest;
 }
 
-double second_order_work(const Tensor2& stress, const Tensor2& stress_increment, const Tensor2& gradient) {
-  const Tensor2 nominal = stress_increment + stress * gradient.trace() - stress * gradient.transpose();
-  return nominal.cwiseProduct(gradient).sum();
-}
-
 }  // namespace femxdem

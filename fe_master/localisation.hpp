@@ -2,7 +2,6 @@
 
 #include "tensor.hpp"
 
-/// Monitors of material instability at a point, in the plane (x1, x2).
 namespace femxdem {
 
 /// Smallest determinant of the in-plane acoustic tensor A_ik = n_j C_ijkl n_l [Pa^2] over the directions of a band
@@ -11,9 +10,5 @@ namespace femxdem {
 /// n_j n_l of either is (sigma n)_i n_k. `inclination`, when given, receives the band's inclination from x1 [rad], in
 /// [0, pi) by steps of half a degree; n = (-sin, cos) of it. Of two equal minima the smaller inclination.
 double min_acoustic_determinant(const Tensor4& tangent, double* inclination = nullptr);
-
-/// Second-order work per current volume [Pa], (d sigma + sigma tr h - sigma h^T) : h, of the step that has led to the
-/// stress sigma by d sigma along the spatial gradient h (Hill, 1958; the increment of the nominal stress against h).
-double second_order_work(const Tensor2& stress, const Tensor2& stress_increment, const Tensor2& gradient);
 
 }  // namespace femxdem
