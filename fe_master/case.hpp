@@ -72,14 +72,13 @@ struct VeParameters {
   std::string scene;                   ///< saved YADE scene, absolute path
   std::vector<std::string> arguments;  ///< command-line arguments of the script
   int spheres = 1000;
-  double size_ratio = 2.0;                        ///< largest over smallest diameter [-]
+  double size_ratio = 1.5;                        ///< largest over smallest diameter [-]
   double kappa = 500.0;                           ///< k_n / (sigma_0 a) [-]
   double stiffness_ratio = 1.0;                   ///< k_n / k_t [-]
   double friction = 0.5;                          ///< mu, inter-granular [-]
   double cohesion = 1.0;                          ///< p* = f_c / (sigma_0 a^2) [-]
   ContactLaw contact_law = ContactLaw::adhesive;  ///< what cohesion means
-  bool adhesive_new_contacts = true;              ///< whether contacts formed later adhere
-  double compaction_friction = 0.1;               ///< mu during the preparation: sets the density [-]
+  double compaction_friction = 0.0;               ///< mu during the preparation: sets the density [-]
   double confining_stress = 1e5;                  ///< sigma_0, isotropic [Pa], compression positive
   double mean_diameter = 1e-3;                    ///< a [m]
   double density = 2600.0;                        ///< of the grains [kg/m^3]

@@ -115,19 +115,6 @@ std::vector<int> elements_of(const Region& region, const Mesh& mesh) {
   return found;
 }
 
-void add_region(Mesh& mesh, const Region& region) {
-  const std::vector<int> elements = elements_of(region, mesh);
-  if (elements.empty())
-    throw UserError(fmt::format(
-        "region '{}' holds no element; enlarge its box (an element is inside when its centre is)", region.name));
-  for (int e : elements) {
-    if (e < 0 || e >= static_cast<int>(mesh.elements.size()))
-      throw UserError(fmt::format("region '{}' names element {}, but the mesh has elements 0 to {}; correct its list",
-                                  region.name, e, mesh.elements.size() - 1));
-  }
-  mesh.regions[region.name] = elements;
-}
-
 }  // namespace
 
 Mesh rectangle_mesh(double width, double height, int nx, int ny) {
@@ -171,6 +158,19 @@ void distort(Mesh& mesh, double distortion, int seed) {
     for (int k = 0; k < 4; ++k) shift[e[4 + k]] = 0.5 * (shift[e[k]] + shift[e[(k + 1) % 4]]);
   }
   for (std::size_t n = 0; n < mesh.nodes.size(); ++n) mesh.nodes[n] += shift[n];
+}
+
+void add_region(Mesh& mesh, const Region& region) {
+  const std::vector<int> elements = elements_of(region, mesh);
+  if (elements.empty())
+    throw UserError(fmt::format(
+        "region '{}' holds no element; enlarge its box (an element is inside when its centre is)", region.name));
+  for (int e : elements) {
+    if (e < 0 || e >= static_cast<int>(mesh.elements.size()))
+      throw UserError(fmt::format("region '{}' names element {}, but the mesh has elements 0 to {}; correct its list",
+                                  region.name, e, mesh.elements.size() - 1));
+  }
+  mesh.regions[region.name] = elements;
 }
 
 Mesh make_mesh(const Case& c) {

@@ -29,7 +29,7 @@ struct Mesh {
   std::map<std::string, std::vector<int>> regions;  ///< named sets of elements
 };
 
-struct MeshParameters;
+struct Region;
 struct Case;
 
 /// Structured nx x ny mesh of [0, width] x [0, height] [m]; edges bottom, right, top, left.
@@ -50,6 +50,9 @@ void distort(Mesh& mesh, double distortion, int seed);
 
 /// Mesh of a case: builder, distortion, regions of the case; checked by check_mesh. Throws UserError.
 Mesh make_mesh(const Case& c);
+
+/// Adds a region of a case: elements whose centre is in its box, or those listed. Throws UserError if there is none.
+void add_region(Mesh& mesh, const Region& region);
 
 /// Throws UserError naming the first element whose Jacobian is not positive at a corner or Gauss point.
 void check_mesh(const Mesh& mesh);
