@@ -12,6 +12,8 @@
 namespace femxdem {
 namespace {
 
+constexpr double kDegree = std::numbers::pi / 180;
+
 Lame lame(double young, double poisson) {
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
@@ -67,14 +69,15 @@ Response respond(const FailingLaw& law, const LawState& state, const Tensor2& F,
 }
 
 /// Irreversible strain of the bar, and its slope, once the largest strain has been `largest`:
-/// e_p = (1 - A2 / A1) <e - e_l>, the ramp rounded by (x + s)^2 / (4 s) for |x| < s; floor: A1 (e - e_p) >= residual.
+/// e_p = (1 - A2 / A1) <e - limit_strain>, the ramp rounded by (x + s)^2 / (4 s) for |x| < s; floor: A1 (e - e_p) >=
+/// residual.
 struct BarHistory {
   double plastic_strain;
   double slope;  ///< d e_p / d(largest strain)
 };
 
 BarHistory bar_history(const BilinearLaw& law, double largest) {
-  const double x = largest - law.e_l;
+  const double x = largest - law.limit_strain;
   const double s = law.smoothing;
   if (x <= -s) return {0, 0};
   const double ratio = 1 - law.A2 / law.A1;
@@ -153,22 +156,22 @@ void check_law(const VonMisesLaw& law) {
 void check_law(const DruckerPragerLaw& law) {
   check_softening(law);
   require(law.cohesion >= 0, fmt::format("cohesion = {} must not be negative", law.cohesion));
-  require(law.friction_angle >= 0 && law.friction_angle < std::numbers::pi / 2,
-          fmt::format("friction_angle = {} rad must lie between 0 and pi/2", law.friction_angle));
+  require(law.friction_angle >= 0 && law.friction_angle < 90 * kDegree,
+          fmt::format("friction_angle = {:g} degrees must lie between 0 and 90", law.friction_angle / kDegree));
   require(std::abs(law.dilatancy_angle) <= law.friction_angle,
-          fmt::format("dilatancy_angle = {} rad must not exceed friction_angle = {} rad", law.dilatancy_angle,
-                      law.friction_angle));
+          fmt::format("dilatancy_angle = {:g} degrees must not exceed friction_angle = {:g} degrees",
+                      law.dilatancy_angle / kDegree, law.friction_angle / kDegree));
 }
 
 void check_law(const BilinearLaw& law) {
   require(law.A1 > 0, fmt::format("A1 = {} must be positive", law.A1));
   require(law.A2 < law.A1, fmt::format("A2 = {} must be below A1 = {}", law.A2, law.A1));
-  require(law.e_l > 0, fmt::format("e_l = {} must be positive", law.e_l));
-  require(law.smoothing >= 0 && law.smoothing < law.e_l,
-          fmt::format("smoothing = {} must lie between 0 and e_l = {}", law.smoothing, law.e_l));
-  require(law.residual_stress >= 0 && law.residual_stress < law.A1 * law.e_l,
-          fmt::format("residual_stress = {} must lie between 0 and the peak A1 e_l = {}", law.residual_stress,
-                      law.A1 * law.e_l));
+  require(law.limit_strain > 0, fmt::format("limit_strain = {} must be positive", law.limit_strain));
+  require(law.smoothing >= 0 && law.smoothing < law.limit_strain,
+          fmt::format("smoothing = {} must lie between 0 and limit_strain = {}", law.smoothing, law.limit_strain));
+  require(law.residual_stress >= 0 && law.residual_stress < law.A1 * law.limit_strain,
+          fmt::format("residual_stress = {} must lie between 0 and the peak A1 limit_strain = {}", law.residual_stress,
+                      law.A1 * law.limit_strain));
 }
 
 }  // namespace

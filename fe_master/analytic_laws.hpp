@@ -35,7 +35,7 @@ struct VonMisesLaw {
 };
 
 /// Drucker-Prager plasticity with cohesion softening and its own dilatancy, on the Jaumann update. The cone
-/// sqrt(J2) + alpha I1 <= k touches Mohr-Coulomb's surface in plane strain (Drucker and Prager, 1952):
+/// sqrt(J2) + alpha I1 <= k has Mohr-Coulomb's limit load in plane strain for psi = phi (Drucker and Prager, 1952):
 /// alpha = tan(phi) / sqrt(9 + 12 tan^2 phi), k = 3 c / sqrt(9 + 12 tan^2 phi); the flow has psi in the place of phi.
 /// c = max(cohesion + hardening gamma_p, residual_stress), gamma_p = int sqrt(2 de_p : de_p) the plastic shear strain.
 struct DruckerPragerLaw {
@@ -55,7 +55,7 @@ struct DruckerPragerLaw {
 struct BilinearLaw {
   double A1 = 0;               ///< [Pa]
   double A2 = 0;               ///< [Pa]
-  double e_l = 0;              ///< strain at the peak [-]
+  double limit_strain = 0;     ///< e_l, strain at the peak [-]
   double residual_stress = 0;  ///< [Pa]
   double smoothing = 0;        ///< half width of the rounded kink [-]
 };

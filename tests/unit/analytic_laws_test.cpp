@@ -83,7 +83,7 @@ const DruckerPragerLaw kDruckerPrager{.young = 1000,
                                       .hardening = -20,
                                       .residual_stress = 0.5,
                                       .initial_pressure = 3};
-const BilinearLaw kBar{.A1 = 100, .A2 = -10, .e_l = 0.01};
+const BilinearLaw kBar{.A1 = 100, .A2 = -10, .limit_strain = 0.01};
 
 /// Errors of sigma_11 and sigma_12 at gamma = 4 against G (1 - cos gamma) and G sin gamma (Dienes, 1979), G = 1.
 Eigen::Array2d shear_errors(int steps) {

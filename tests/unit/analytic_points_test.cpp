@@ -20,7 +20,7 @@ std::vector<AnalyticLaw> one_of_each() {
           kStrong,
           weak,
           DruckerPragerLaw{.young = 1000, .poisson = 0.25, .cohesion = 2, .friction_angle = 0.5, .initial_pressure = 3},
-          BilinearLaw{.A1 = 100, .A2 = -10, .e_l = 0.01}};
+          BilinearLaw{.A1 = 100, .A2 = -10, .limit_strain = 0.01}};
 }
 
 /// The same plane-strain gradient at every point, t times a stretch with shear.
@@ -141,7 +141,7 @@ TEST(AnalyticPoints, ParametersOutOfBoundsAreNamed) {
   names("dilatancy_angle", DruckerPragerLaw{1, 0.25, 1, 0.3, 0.4});
   names("friction_angle", DruckerPragerLaw{1, 0.25, 1, 2});
   names("A2", BilinearLaw{1, 2, 0.1});
-  names("e_l", BilinearLaw{1, -1, 0});
+  names("limit_strain", BilinearLaw{1, -1, 0});
   // 3 G + hardening = 0 is the limit for von Mises: 3 G = 1200
   names("keep it above -1200", VonMisesLaw{1000, 0.25, 1, -1200});
   EXPECT_EQ(complaint(VonMisesLaw{1000, 0.25, 1, -1199}), "");
