@@ -37,9 +37,10 @@ void prepare_output_folder(const fs::path& folder, Existing existing) {
   if (existing == Existing::overwrite) remove_results(folder);
   const bool holds_results = fs::exists(folder / "history.csv") || fs::exists(folder / "results.h5");
   if (existing == Existing::refuse && holds_results) {
-    throw UserError(fmt::format(
-        "{}: holds the results of an earlier run; go on with --restart, remove the folder or choose another --out",
-        folder.string()));
+    throw UserError(
+        fmt::format("{}: holds the results of an earlier run; go on with --restart, replace them with --overwrite or "
+                    "choose another --out",
+                    folder.string()));
   }
 }
 

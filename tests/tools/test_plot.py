@@ -9,7 +9,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "validation"))
 from plot import plot_run, quarters
-from results import (ResultsError, axial_curve, deformed_points, logarithmic_strain, path_curve, read_mesh, read_step,
+from results import (ResultsError, axial_curve, deformed_points, logarithmic_strain, natural_coordinates, path_curve, read_mesh, read_step,
                      shape_functions, strain_invariant)
 from sample_run import write_run
 
@@ -78,6 +78,12 @@ class Formulas(unittest.TestCase):
     def test_shape_functions_are_one_at_their_node(self):
         nodes = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0)], dtype=float)
         np.testing.assert_allclose(shape_functions(nodes[:, 0], nodes[:, 1]), np.eye(8), atol=1e-15)
+
+    def test_natural_coordinates_are_found_in_a_distorted_element(self):
+        nodes = np.array([(0, 0), (2, 0.2), (2.3, 1.9), (-0.1, 1.5), (1, -0.2), (2.2, 1), (1, 1.8), (0.1, 0.8)])
+        natural = np.array([[(-0.57, -0.57), (0.57, -0.57), (-0.57, 0.57), (0.9, 0.8)]])
+        positions = shape_functions(natural[..., 0], natural[..., 1]) @ nodes
+        np.testing.assert_allclose(natural_coordinates(nodes[None], positions), natural, atol=1e-12)
 
     def test_strain_invariant_of_a_rotated_stretch(self):
         angle = 1.1

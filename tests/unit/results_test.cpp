@@ -149,10 +149,9 @@ TEST_F(ResultsTest, EarlierResultsAreOverwrittenOnlyWhenAsked) {
     Results second(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
     FAIL() << "overwrote";
   } catch (const UserError& error) {
-    EXPECT_EQ(
-        std::string(error.what()),
-        folder_.string() +
-            ": holds the results of an earlier run; go on with --restart, remove the folder or choose another --out");
+    EXPECT_EQ(std::string(error.what()), folder_.string() +
+                                             ": holds the results of an earlier run; go on with --restart, replace "
+                                             "them with --overwrite or choose another --out");
   }
   std::ofstream(folder_ / "notes.md") << "mine";
   Results third(folder_, two_squares(), points_of_two_squares(), Existing::overwrite);
