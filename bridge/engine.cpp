@@ -1,0 +1,133 @@
+#include "engine.hpp"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <stdexcept>
+
+namespace py = pybind11;
+
+namespace femxdem {
+namespace {
+
+/// Interpreter of Debian's Python, whichever python3 comes first on PATH; signals are left to the worker.
+py::scoped_interpreter start_interpreter() {
+  PyConfig config;
+  PyConfig_InitPythonConfig(&config);
+  config.install_signal_handlers = 0;
+  config.parse_argv = 0;
+  PyConfig_SetBytesString(&config, &config.program_name, FEMXDEM_PYTHON);
+  return py::scoped_interpreter(&config, 0, nullptr, false);
+}
+
+/// The exception's own text; its type in front unless the text is a sentence by convention of the engine.
+std::string sentence(py::error_already_set& error) {
+  const std::string text = py::str(error.value());
+  const std::string type = py::str(error.type().attr("__name__"));
+  const bool spoken = !text.empty() && (type == "RuntimeError" || type == "ValueError");
+  return spoken ? text : type + (text.empty() ? "" : ": " + text);
+}
+
+/// The call's result; Python's exceptions become std::runtime_error.
+template <class Call>
+auto in_python(Call&& call) {
+  try {
+    return call();
+  } catch (py::error_already_set& error) {
+    throw std::runtime_error(sentence(error));
+  }
+}
+
+/// View of shared memory, not a copy.
+template <std::size_t N>
+py::array_t<double> view(std::array<double, N>& numbers) {
+  return py::array_t<double>(N, numbers.data(), py::capsule(numbers.data(), [](void*) {}));
+}
+
+std::string to_json(const py::object& object) { return py::str(py::module_::import("json").attr("dumps")(object)); }
+
+}  // namespace
+
+Engine::Engine(const std::string& name, const std::string& python_path) : interpreter_(start_interpreter()) {
+  const auto colon = name.find(':');
+  if (colon == std::string::npos)
+    throw std::runtime_error("engine '" + name + "': expected module:class, such as volume_element:Engine");
+  in_python([&] {
+    const py::list fields = py::cast(std::vector<std::string>(kReportFields.begin(), kReportFields.end()));
+    py::module_::import("sys").attr("path").attr("insert")(0, python_path);
+    py::module_ module = py::module_::import(name.substr(0, colon).c_str());
+    engine_ = module.attr(name.substr(colon + 1).c_str())(fields);
+  });
+}
+
+std::string Engine::versions() {
+  return in_python([&] { return to_json(engine_.attr("versions")()); });
+}
+
+Engine::Template Engine::make_template(const std::string& specification_json) {
+  return in_python([&] {
+    const py::object specification = py::module_::import("json").attr("loads")(specification_json);
+    const py::dict made = engine_.attr("make_template")(specification);
+    return Template{py::cast<std::string>(py::bytes(made["state"])), to_json(made["manifest"])};
+  });
+}
+
+int Engine::add(const std::string& state) {
+  return in_python([&] { return py::cast<int>(engine_.attr("add")(py::bytes(state))); });
+}
+
+void Engine::replace(int ve, const std::string& state) {
+  in_python([&] { engine_.attr("replace")(ve, py::bytes(state)); });
+}
+
+std::string Engine::save(int ve) {
+  return in_python([&] { return py::cast<std::string>(py::bytes(engine_.attr("save")(ve))); });
+}
+
+void Engine::remove(int ve) {
+  in_python([&] { engine_.attr("remove")(ve); });
+}
+
+VeInfo Engine::info(int ve) {
+  return in_python([&] {
+    const py::dict info = engine_.attr("info")(ve);
+    const auto number = [&](const char* key) { return py::cast<double>(py::float_(info[key])); };
+    return VeInfo{number("time_step"), number("time_scale"),    number("volume"),
+                  number("spheres"),   number("mean_diameter"), number("mean_stress")};
+  });
+}
+
+void Engine::deform(int ve, Slot& slot) {
+  in_python(
+      [&] { engine_.attr("deform")(ve, view(slot.velocity_gradient).attr("reshape")(3, 3), py::int_(slot.steps)); });
+}
+
+void Engine::measure(int ve, Slot& slot) {
+  in_python([&] { engine_.attr("measure")(ve, view(slot.stress), view(slot.report), view(slot.stretch)); });
+}
+
+void Engine::stiffness(int ve, Slot& slot) {
+  in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness)); });
+}
+
+pid_t Engine::fork() {
+  PyOS_BeforeFork();
+  const pid_t pid = ::fork();
+  if (pid == 0)
+    PyOS_AfterFork_Child();
+  else
+    PyOS_AfterFork_Parent();
+  return pid;
+}
+
+void Engine::flush() {
+  in_python([] {
+    py::module_::import("sys").attr("stdout").attr("flush")();
+    py::module_::import("sys").attr("stderr").attr("flush")();
+  });
+  std::fflush(nullptr);
+}
+
+}  // namespace femxdem

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <pybind11/embed.h>
+#include <sys/types.h>
+
+#include <string>
+
+#include "worker_protocol.hpp"
+
+namespace femxdem {
+
+/// The Python interpreter and the engine that it runs (yade_scripts/protocol.py). One a process.
+///
+/// Every function throws std::runtime_error with the sentence of the Python exception.
+class Engine {
+ public:
+  /// `name` is module:class, looked for in `python_path` first.
+  Engine(const std::string& name, const std::string& python_path);
+
+  struct Template {
+    std::string state;
+    std::string manifest;  ///< JSON
+  };
+  std::string versions();  ///< JSON
+  Template make_template(const std::string& specification_json);
+  int add(const std::string& state);
+  void replace(int ve, const std::string& state);
+  std::string save(int ve);
+  void remove(int ve);
+  VeInfo info(int ve);
+  /// Holds the slot's velocity gradient for its number of steps.
+  void deform(int ve, Slot& slot);
+  /// Stress, report and stretch into the slot.
+  void measure(int ve, Slot& slot);
+  void stiffness(int ve, Slot& slot);
+
+  /// fork() with the interpreter's consent.
+  static pid_t fork();
+  /// Empties the output buffers of C and Python.
+  void flush();
+
+ private:
+  pybind11::scoped_interpreter interpreter_;
+  pybind11::object engine_;
+};
+
+}  // namespace femxdem

@@ -1,0 +1,89 @@
+#include "ve_templates.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "output_folder.hpp"
+
+namespace femxdem {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// FNV-1a hash, 64 bits: names a file of the cache.
+std::string hash(std::string_view text) {
+  std::uint64_t h = 14695981039346656037ull;
+  for (const unsigned char c : text) h = (h ^ c) * 1099511628211ull;
+  return fmt::format("{:016x}", h);
+}
+
+std::string read_file(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+/// What the prepared state depends on besides the specification: the files that it names.
+std::string key_of(const VeParameters& ve, const std::string& specification, const std::string& versions) {
+  std::string key = specification + versions;
+  for (const std::string& file : {ve.script, ve.scene}) {
+    if (!file.empty()) key += read_file(file);
+  }
+  return hash(key);
+}
+
+std::map<std::string, std::string> parse_strings(const std::string& json) {
+  static const std::regex entry("\"([^\"]+)\"\\s*:\\s*\"([^\"]*)\"");
+  std::map<std::string, std::string> values;
+  for (std::sregex_iterator i(json.begin(), json.end(), entry), end; i != end; ++i) values[(*i)[1]] = (*i)[2];
+  return values;
+}
+
+}  // namespace
+
+std::vector<std::string> make_templates(PythonVolumeElements& elements, const std::vector<VeParameters>& pool,
+                                        const std::function<void(std::string_view)>& say) {
+  const std::string versions = elements.versions();
+  std::vector<std::string> states;
+  for (const VeParameters& ve : pool) {
+    const std::string specification = ve_spec_json(ve);
+    const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
+    const std::string name = key_of(ve, specification, versions);
+    const fs::path state = folder / (name + ".state"), manifest = folder / (name + ".json");
+    if (fs::exists(state) && fs::exists(manifest)) {
+      states.push_back(read_file(state));
+      say(fmt::format("volume element {} of {}: {}", states.size(), pool.size(), state.string()));
+      continue;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const auto made = elements.make_template(specification);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    fs::create_directories(folder);
+    replace_file(manifest, made.manifest);
+    replace_file(state, made.state);
+    states.push_back(made.state);
+    say(fmt::format("volume element {} of {}: made in {:.1f} s, {}", states.size(), pool.size(), seconds,
+                    state.string()));
+  }
+  return states;
+}
+
+std::map<std::string, std::string> engine_versions(PythonVolumeElements& elements) {
+  return parse_strings(elements.versions());
+}
+
+VolumeElementOptions ve_options(const VeParameters& ve) {
+  VolumeElementOptions options;
+  options.inertial_number = ve.inertial_number;
+  options.min_steps = ve.min_steps;
+  options.max_unbalanced_force = ve.max_unbalanced_force;
+  options.serialise = ve.snapshot == Snapshot::serialise;
+  return options;
+}
+
+}  // namespace femxdem

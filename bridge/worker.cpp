@@ -1,0 +1,282 @@
+#include "worker.hpp"
+
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+
+#include "mailbox.hpp"
+
+namespace femxdem {
+namespace {
+
+std::optional<Message> receive() {
+  Message message;
+  for (;;) {
+    const ssize_t size = recv(kSocketDescriptor, &message, sizeof message, 0);
+    if (size == sizeof message) return message;
+    if (size < 0 && errno == EINTR) continue;
+    return std::nullopt;
+  }
+}
+
+void reply(const Message& message, ReplyKind kind, std::int64_t value = 0, std::int64_t mail = 0) {
+  const Reply reply{kind, message.number, value, mail};
+  send(kSocketDescriptor, &reply, sizeof reply, MSG_NOSIGNAL);
+}
+
+void reply_error(const Message& message, const std::string& sentence) {
+  reply(message, ReplyKind::error, 0, put_mail(kMailDescriptor, sentence));
+}
+
+/// From now on this process dies with its parent, which must be `parent`.
+void die_with(pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(1);
+}
+
+constexpr std::size_t kReport(std::string_view field) {
+  for (std::size_t k = 0; k < kReportFields.size(); ++k)
+    if (kReportFields[k] == field) return k;
+  throw std::out_of_range("no such report");
+}
+
+void write_sentence(Slot& slot, const char* text) {
+  slot.outcome = Outcome::failed;
+  std::strncpy(slot.sentence.data(), text, slot.sentence.size() - 1);
+  slot.sentence.back() = '\0';
+}
+
+}  // namespace
+
+void Worker::serve() {
+  while (const auto message = receive()) {
+    if (message->command == Command::quit) return;
+    try {
+      answer(*message);
+    } catch (const std::exception& error) {
+      reply_error(*message, error.what());
+    }
+  }
+}
+
+void Worker::answer(const Message& message) {
+  const bool changes_states = message.command == Command::add || message.command == Command::remove ||
+                              message.command == Command::save || message.command == Command::load;
+  if (changes_states) snapshot_.clear();
+  switch (message.command) {
+    case Command::versions:
+      return reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, engine_.versions()));
+    case Command::make_template:
+      return make_template(message);
+    case Command::add:
+      return add(message);
+    case Command::remove:
+      return remove(message);
+    case Command::evaluate:
+      return evaluate(message);
+    case Command::commit:
+      return commit_in_process(message);
+    case Command::reject:
+      return reject_in_process();
+    case Command::save:
+      return save(message);
+    case Command::load:
+      return load(message);
+    case Command::quit:
+      return;
+  }
+}
+
+void Worker::add(const Message& message) {
+  const std::string state = get_mail(kMailDescriptor, message.mail);
+  if (ves_.size() + static_cast<std::size_t>(message.a) > Batch::kCapacity)
+    throw std::runtime_error("too many volume elements for one rank; use more ranks");
+  for (std::int64_t copy = 0; copy < message.a; ++copy) {
+    ves_.push_back(engine_.add(state));
+    refresh(ves_.size() - 1);
+  }
+  reply(message, ReplyKind::done);
+}
+
+void Worker::remove(const Message& message) {
+  const auto index = static_cast<std::size_t>(message.a);
+  engine_.remove(ves_.at(index));
+  ves_.erase(ves_.begin() + message.a);
+  for (std::size_t i = index; i < ves_.size(); ++i) batch_.slots[i] = batch_.slots[i + 1];
+  reply(message, ReplyKind::done);
+}
+
+void Worker::save(const Message& message) {
+  const auto index = static_cast<std::size_t>(message.a);
+  const std::string state = engine_.save(ves_.at(index));
+  engine_.replace(ves_[index], state);
+  refresh(index);
+  reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, state));
+}
+
+void Worker::load(const Message& message) {
+  const auto index = static_cast<std::size_t>(message.a);
+  engine_.replace(ves_.at(index), get_mail(kMailDescriptor, message.mail));
+  refresh(index);
+  reply(message, ReplyKind::done);
+}
+
+void Worker::refresh(std::size_t index) {
+  Slot& slot = batch_.slots[index];
+  engine_.measure(ves_[index], slot);
+  slot.info = engine_.info(ves_[index]);
+}
+
+void Worker::make_template(const Message& message) {
+  const std::string specification = get_mail(kMailDescriptor, message.mail);
+  engine_.flush();
+  const pid_t self = getpid();
+  const pid_t child = Engine::fork();
+  if (child < 0) throw std::runtime_error("a process for the template could not be started: not enough memory");
+  if (child > 0) return await_child(message, child);
+
+  die_with(self);
+  setpgid(0, 0);  // what a user's script starts ends with it
+  batch_.child = getpid();
+  try {
+    const Engine::Template made = engine_.make_template(specification);
+    engine_.flush();
+    const std::int64_t size = put_mail(kMailDescriptor, made.state + made.manifest);
+    reply(message, ReplyKind::done, static_cast<std::int64_t>(made.state.size()), size);
+  } catch (const std::exception& error) {
+    reply_error(message, error.what());
+  }
+  _exit(kOrderlyExit);
+}
+
+void Worker::evaluate(const Message& message) {
+  if (message.b == 1) {
+    engine_.flush();
+    const pid_t self = getpid();
+    const pid_t trial = Engine::fork();
+    if (trial == 0) return serve_trial(message, self);
+    if (trial > 0) return await_child(message, trial);
+  }
+  if (snapshot_.empty()) take_snapshot();
+  if (trial_in_process_) reject_in_process();
+  trial_in_process_ = true;
+  deform_all(message.a == 1);
+  reply(message, ReplyKind::done, 0);
+}
+
+void Worker::await_child(const Message& message, pid_t child) {
+  siginfo_t ended{};
+  while (waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+  }
+  kill(-child, SIGKILL);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  batch_.child = 0;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kOrderlyExit) return;
+  reply(message, ReplyKind::child_died, status);
+}
+
+void Worker::serve_trial(const Message& message, pid_t committed) {
+  die_with(committed);
+  batch_.child = getpid();
+  deform_all(message.a == 1);
+  reply(message, ReplyKind::done, 1);
+  const auto verdict = receive();
+  if (!verdict || verdict->command != Command::commit) _exit(kOrderlyExit);
+  try {
+    adopt_trial(*verdict, committed);
+  } catch (const std::exception& error) {
+    reply_error(*verdict, error.what());
+    _exit(kOrderlyExit);
+  }
+}
+
+void Worker::adopt_trial(const Message& message, pid_t committed) {
+  std::vector<VeInfo> infos;
+  for (const int ve : ves_) infos.push_back(engine_.info(ve));
+  prctl(PR_SET_PDEATHSIG, 0);
+  kill(committed, SIGKILL);  // from here on this is the committed state
+  batch_.child = 0;
+  snapshot_.clear();
+  for (std::size_t i = 0; i < ves_.size(); ++i) batch_.slots[i].info = infos[i];
+  reply(message, ReplyKind::done, getpid());
+  while (getppid() == committed) usleep(100);  // until its memory is freed; then the rank is the parent
+  die_with(rank_);
+}
+
+void Worker::commit_in_process(const Message& message) {
+  if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
+  trial_in_process_ = false;
+  snapshot_.clear();
+  for (std::size_t i = 0; i < ves_.size(); ++i) batch_.slots[i].info = engine_.info(ves_[i]);
+  reply(message, ReplyKind::done, getpid());
+}
+
+void Worker::reject_in_process() {
+  if (!trial_in_process_) return;
+  trial_in_process_ = false;
+  for (std::size_t i = 0; i < ves_.size(); ++i) engine_.replace(ves_[i], snapshot_[i]);
+}
+
+void Worker::take_snapshot() {
+  for (const int ve : ves_) {
+    snapshot_.push_back(engine_.save(ve));
+    engine_.replace(ve, snapshot_.back());
+  }
+}
+
+void Worker::deform_all(bool with_stiffness) {
+  for (std::size_t i = 0; i < ves_.size(); ++i) {
+    batch_.slots[i].outcome = Outcome::none;
+    if (batch_.slots[i].task == Task::skip) continue;
+    batch_.in_flight = static_cast<std::int64_t>(i);
+    deform_one(i, with_stiffness);
+  }
+  batch_.in_flight = kNone;
+}
+
+void Worker::deform_one(std::size_t index, bool with_stiffness) {
+  Slot& slot = batch_.slots[index];
+  const int ve = ves_[index];
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    if (slot.steps > 0) engine_.deform(ve, slot);
+    engine_.measure(ve, slot);
+    if (with_stiffness) engine_.stiffness(ve, slot);
+    slot.outcome = Outcome::answered;
+  } catch (const std::exception& error) {
+    write_sentence(slot, error.what());
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  slot.report[kReport("seconds")] = seconds.count();
+}
+
+}  // namespace femxdem
+
+int main(int argc, char** argv) {
+  using namespace femxdem;
+  if (argc != 4) return 2;
+  const auto rank = static_cast<pid_t>(std::stol(argv[3]));
+  die_with(rank);
+  std::signal(SIGINT, SIG_IGN);  // the rank decides
+  Message ready;
+  try {
+    Batch& batch = *static_cast<Batch*>(map_shared(kBatchDescriptor, sizeof(Batch)));
+    Engine engine(argv[1], argv[2]);
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGTERM}) std::signal(signal, SIG_DFL);
+    reply(ready, ReplyKind::done, getpid());
+    Worker(engine, batch, rank).serve();
+    engine.flush();
+  } catch (const std::exception& error) {
+    reply_error(ready, error.what());
+  }
+  _exit(0);  // the volume elements go with the process
+}

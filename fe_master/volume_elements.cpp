@@ -1,0 +1,319 @@
+#include "volume_elements.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <stdexcept>
+
+#include "errors.hpp"
+#include "packet.hpp"
+#include "schedule.hpp"
+
+namespace femxdem {
+namespace {
+
+enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, peak_memory, end };
+enum class Verdict : std::int32_t { done, user_error, error };
+
+constexpr int kTag = 0;
+
+/// Waits without taking the processor from the workers: a rank may wait for seconds, and there may be more ranks than
+/// processors.
+void wait(MPI_Request& request) {
+  int arrived = 0;
+  for (int spins = 0; MPI_Test(&request, &arrived, MPI_STATUS_IGNORE), !arrived; ++spins)
+    if (spins > 1000) usleep(50);
+}
+
+/// Counts of MPI are ints: long texts go in pieces.
+template <class Transfer>
+void in_pieces(std::size_t size, Transfer transfer) {
+  constexpr std::size_t piece = std::size_t{1} << 30;
+  for (std::size_t done = 0; done < size; done += piece) {
+    MPI_Request request = transfer(done, static_cast<int>(std::min(piece, size - done)));
+    wait(request);
+  }
+}
+
+void send(MPI_Comm communicator, int rank, const std::string& bytes) {
+  const std::uint64_t size = bytes.size();
+  MPI_Send(&size, 1, MPI_UINT64_T, rank, kTag, communicator);
+  in_pieces(bytes.size(), [&](std::size_t start, int count) {
+    MPI_Request request;
+    MPI_Isend(bytes.data() + start, count, MPI_BYTE, rank, kTag, communicator, &request);
+    return request;
+  });
+}
+
+std::string receive(MPI_Comm communicator, int rank) {
+  std::uint64_t size = 0;
+  MPI_Request announced;
+  MPI_Irecv(&size, 1, MPI_UINT64_T, rank, kTag, communicator, &announced);
+  wait(announced);
+  std::string bytes(size, '\0');
+  in_pieces(bytes.size(), [&](std::size_t start, int count) {
+    MPI_Request request;
+    MPI_Irecv(bytes.data() + start, count, MPI_BYTE, rank, kTag, communicator, &request);
+    return request;
+  });
+  return bytes;
+}
+
+int size_of(MPI_Comm communicator) {
+  int ranks = 1;
+  MPI_Comm_size(communicator, &ranks);
+  return ranks;
+}
+
+void put_response(PacketWriter& packet, const Response& response, bool with_stiffness) {
+  packet.put_doubles(response.stress.data(), 9);
+  if (with_stiffness) packet.put_doubles(response.stiffness.data(), 81);
+  packet.put_doubles(response.report.values.data(), response.report.values.size());
+  packet.put<bool>(response.failure.has_value());
+  if (!response.failure) return;
+  packet.put(response.failure->sentence);
+  packet.put(response.failure->advice);
+}
+
+Response get_response(PacketReader& packet, bool with_stiffness, std::size_t point) {
+  Response response;
+  packet.get_doubles(response.stress.data(), 9);
+  if (with_stiffness) packet.get_doubles(response.stiffness.data(), 81);
+  packet.get_doubles(response.report.values.data(), response.report.values.size());
+  if (packet.get<bool>()) {
+    response.failure.emplace();
+    response.failure->point = point;
+    response.failure->sentence = packet.get_text();
+    response.failure->advice = packet.get_text();
+  }
+  return response;
+}
+
+/// Input: the templates, then that of each point.
+void add(LocalPoints& local, PacketReader input) {
+  std::vector<std::string> templates(input.get<std::size_t>());
+  for (std::string& state : templates) state = input.get_text();
+  const auto points = input.get<std::size_t>();
+  std::size_t run = 0;
+  int of_run = -1;
+  const auto flush = [&] {
+    if (run > 0) local.add(templates.at(static_cast<std::size_t>(of_run)), run);
+  };
+  for (std::size_t p = 0; p < points; ++p) {
+    const int of_point = input.get<int>();
+    if (of_point != of_run) {
+      flush();
+      run = 0;
+    }
+    of_run = of_point;
+    ++run;
+  }
+  flush();
+}
+
+std::string evaluate(LocalPoints& local, PacketReader input) {
+  const auto wanted = static_cast<Operator>(input.get<int>());
+  std::vector<Tensor2> F(local.size());
+  for (Tensor2& gradient : F) input.get_doubles(gradient.data(), 9);
+  PacketWriter output;
+  for (const Response& response : local.evaluate(F, wanted)) put_response(output, response, wanted != Operator::none);
+  return output.take();
+}
+
+std::string save(LocalPoints& local) {
+  PacketWriter output;
+  for (const std::string& state : local.save()) output.put(state);
+  return output.take();
+}
+
+void load(LocalPoints& local, PacketReader input) {
+  SavedStates states(local.size());
+  for (std::string& state : states) state = input.get_text();
+  local.load(states);
+}
+
+std::string carry_out(Order order, const std::string& input, LocalPoints& local) {
+  PacketWriter output;
+  switch (order) {
+    case Order::add:
+      add(local, PacketReader(input));
+      break;
+    case Order::begin_step:
+      local.begin_step();
+      break;
+    case Order::evaluate:
+      return evaluate(local, PacketReader(input));
+    case Order::commit:
+      local.commit();
+      break;
+    case Order::save:
+      return save(local);
+    case Order::load:
+      load(local, PacketReader(input));
+      break;
+    case Order::peak_memory:
+      output.put(local.peak_memory());
+      break;
+    case Order::end:
+      break;
+  }
+  return output.take();
+}
+
+/// The answer of a rank: verdict, then the output or the text of the exception.
+std::string answer(Order order, const std::string& input, LocalPoints& local) {
+  const auto packed = [](Verdict verdict, std::string_view text) {
+    PacketWriter packet;
+    packet.put(static_cast<std::int32_t>(verdict));
+    packet.put(text);
+    return packet.take();
+  };
+  try {
+    return packed(Verdict::done, carry_out(order, input, local));
+  } catch (const UserError& error) {
+    return packed(Verdict::user_error, error.what());
+  } catch (const std::exception& error) {
+    return packed(Verdict::error, error.what());
+  }
+}
+
+/// Outputs of the ranks; throws what the first of them that failed has to say.
+std::vector<std::string> outputs(const std::vector<std::string>& answers) {
+  std::vector<std::string> texts;
+  for (std::size_t rank = 0; rank < answers.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    const auto verdict = static_cast<Verdict>(packet.get<std::int32_t>());
+    texts.push_back(packet.get_text());
+    if (verdict == Verdict::user_error) throw UserError(texts.back());
+    if (verdict == Verdict::error) throw std::runtime_error("rank " + std::to_string(rank) + ": " + texts.back());
+  }
+  return texts;
+}
+
+/// One order to all ranks, each with its own input: their outputs. Rank 0 does its own share meanwhile.
+std::vector<std::string> command(MPI_Comm communicator, Order order, const std::vector<std::string>& inputs,
+                                 LocalPoints& local) {
+  const int ranks = size_of(communicator);
+  for (int rank = 1; rank < ranks; ++rank) {
+    PacketWriter packet;
+    packet.put(static_cast<std::int32_t>(order));
+    packet.put(inputs.empty() ? std::string() : inputs[static_cast<std::size_t>(rank)]);
+    send(communicator, rank, packet.take());
+  }
+  std::vector<std::string> answers{answer(order, inputs.empty() ? std::string() : inputs[0], local)};
+  for (int rank = 1; rank < ranks; ++rank) answers.push_back(receive(communicator, rank));
+  return outputs(answers);
+}
+
+}  // namespace
+
+VolumeElements::VolumeElements(MPI_Comm communicator, LocalPoints& local, const std::vector<std::string>& templates,
+                               const std::vector<int>& template_of_point)
+    : communicator_(communicator), local_(local), owner_(assign(template_of_point.size(), size_of(communicator))) {
+  std::vector<std::string> inputs;
+  for (const auto& points : points_of_ranks()) {
+    PacketWriter packet;
+    packet.put(templates.size());
+    for (const std::string& state : templates) packet.put(state);
+    packet.put(points.size());
+    for (const std::size_t point : points) packet.put(template_of_point[point]);
+    inputs.push_back(packet.take());
+  }
+  try {
+    command(communicator_, Order::add, inputs, local_);
+  } catch (const std::exception&) {
+    command(communicator_, Order::end, {}, local_);
+    throw;
+  }
+}
+
+VolumeElements::~VolumeElements() { command(communicator_, Order::end, {}, local_); }
+
+std::vector<std::vector<std::size_t>> VolumeElements::points_of_ranks() const {
+  std::vector<std::vector<std::size_t>> points(static_cast<std::size_t>(size_of(communicator_)));
+  for (std::size_t p = 0; p < owner_.size(); ++p) points[static_cast<std::size_t>(owner_[p])].push_back(p);
+  return points;
+}
+
+void VolumeElements::begin_step() { command(communicator_, Order::begin_step, {}, local_); }
+
+std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
+  if (F.size() != size()) throw std::invalid_argument("evaluate: one deformation gradient per point");
+  const auto start = std::chrono::steady_clock::now();
+  const auto points = points_of_ranks();
+  std::vector<std::string> inputs;
+  for (const auto& share : points) {
+    PacketWriter packet;
+    packet.put(static_cast<int>(wanted));
+    for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
+    inputs.push_back(packet.take());
+  }
+  const std::vector<std::string> answers = command(communicator_, Order::evaluate, inputs, local_);
+  std::vector<Response> responses(size());
+  for (std::size_t rank = 0; rank < points.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    for (const std::size_t point : points[rank])
+      responses[point] = get_response(packet, wanted != Operator::none, point);
+    if (rank > 0) statistics_.bytes += inputs[rank].size() + answers[rank].size();
+  }
+  count(responses, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return responses;
+}
+
+void VolumeElements::count(const std::vector<Response>& responses, double seconds) {
+  ++statistics_.batches;
+  statistics_.evaluations += static_cast<long>(responses.size());
+  statistics_.seconds += seconds;
+  for (const Response& response : responses) {
+    statistics_.dem_steps += response.report["dem_steps"];
+    statistics_.trial_seconds += response.report["seconds"];
+    statistics_.engine_seconds += response.report["engine_seconds"];
+  }
+}
+
+void VolumeElements::commit() { command(communicator_, Order::commit, {}, local_); }
+
+SavedStates VolumeElements::save() {
+  const std::vector<std::string> answers = command(communicator_, Order::save, {}, local_);
+  const auto points = points_of_ranks();
+  SavedStates states(size());
+  for (std::size_t rank = 0; rank < points.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    for (const std::size_t point : points[rank]) states[point] = packet.get_text();
+  }
+  return states;
+}
+
+void VolumeElements::load(const SavedStates& states) {
+  if (states.size() != size())
+    throw UserError("checkpoint: " + std::to_string(states.size()) + " points saved, " + std::to_string(size()) +
+                    " expected; restart with the case that wrote it");
+  std::vector<std::string> inputs;
+  for (const auto& share : points_of_ranks()) {
+    PacketWriter packet;
+    for (const std::size_t point : share) packet.put(states[point]);
+    inputs.push_back(packet.take());
+  }
+  command(communicator_, Order::load, inputs, local_);
+}
+
+std::uint64_t VolumeElements::peak_memory() {
+  std::uint64_t sum = 0;
+  for (const std::string& output : command(communicator_, Order::peak_memory, {}, local_))
+    sum += PacketReader(output).get<std::uint64_t>();
+  return sum;
+}
+
+void serve(MPI_Comm communicator, LocalPoints& local) {
+  for (;;) {
+    const std::string message = receive(communicator, 0);
+    PacketReader packet(message);
+    const auto order = static_cast<Order>(packet.get<std::int32_t>());
+    send(communicator, 0, answer(order, packet.get_text(), local));
+    if (order == Order::end) return;
+  }
+}
+
+}  // namespace femxdem
