@@ -93,7 +93,6 @@ Results::Results(const std::filesystem::path& folder, const Mesh& mesh, std::spa
                  Existing existing, int last_step)
     : folder_(folder), nodes_(mesh.nodes.size()), elements_(mesh.elements.size()) {
   assert(points.size() % elements_ == 0);
-  prepare_output_folder(folder, existing);
   if (existing == Existing::resume && std::filesystem::exists(folder / kFile)) {
     resume(last_step);
   } else {

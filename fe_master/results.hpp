@@ -32,7 +32,7 @@ struct FieldStep {
 /// Both files are complete and closed after every write: a run that ends early keeps everything written before.
 class Results {
  public:
-  /// `points`: reference positions of the Gauss points [m], element by element. With Existing::resume the steps after
+  /// The folder exists (prepare_output_folder). `points`: reference positions of the Gauss points [m], element by element. With Existing::resume the steps after
   /// `last_step` are removed from the files; otherwise they are begun.
   Results(const std::filesystem::path& folder, const Mesh& mesh, std::span<const Point2> points, Existing existing,
           int last_step = 0);

@@ -1,0 +1,171 @@
+// femxdem: boundary value problems of granular materials, finite elements with volume elements of spheres.
+#include <mpi.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "case.hpp"
+#include "errors.hpp"
+#include "mesh.hpp"
+#include "simulation.hpp"
+#include "ve_templates.hpp"
+#include "versions.hpp"
+#include "volume_elements.hpp"
+
+namespace femxdem {
+namespace {
+
+struct Arguments {
+  std::string case_file;
+  std::string folder;
+  std::vector<std::string> overrides;
+  bool restart = false;
+  bool overwrite = false;
+  std::string command_line;
+};
+
+/// MPI for the life of the program; the worker must have been started before.
+struct Mpi {
+  Mpi() {
+    MPI_Init(nullptr, nullptr);
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &size);
+  }
+  ~Mpi() { MPI_Finalize(); }
+  Mpi(const Mpi&) = delete;
+  Mpi& operator=(const Mpi&) = delete;
+  /// Whether rank 0 goes on: what it found out before the ranks work together.
+  bool agree(bool go) const {
+    int flag = go;
+    MPI_Bcast(&flag, 1, MPI_INT, 0, MPI_COMM_WORLD);
+    return flag != 0;
+  }
+  int rank = 0, size = 1;
+};
+
+/// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
+bool speaks() {
+  const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
+  return rank == nullptr || std::string(rank) == "0";
+}
+
+RunOptions run_options(const Case& c, const Arguments& arguments) {
+  RunOptions options;
+  options.folder = !arguments.folder.empty()     ? std::filesystem::path(arguments.folder)
+                   : !c.output.directory.empty() ? std::filesystem::path(c.output.directory)
+                                                 : std::filesystem::path("out") / std::filesystem::path(c.file).stem();
+  options.existing = arguments.restart     ? Existing::resume
+                     : arguments.overwrite ? Existing::overwrite
+                                           : Existing::refuse;
+  options.command_line = arguments.command_line;
+  options.versions = library_versions();
+  return options;
+}
+
+std::vector<int> templates_of_points(const VePool& pool) {
+  std::vector<int> of_point;
+  for (const int t : pool.template_of_element) of_point.insert(of_point.end(), kPointsPerElement, t);
+  return of_point;
+}
+
+int run_on_volume_elements(const Case& c, const Mesh& mesh, RunOptions options) {
+  WorkerProcess worker({});
+  const Mpi mpi;
+  PythonVolumeElements local(worker, ve_options(c.ve));
+  if (mpi.rank > 0) {
+    if (!mpi.agree(true)) return kBadInput;
+    serve(MPI_COMM_WORLD, local);
+    return kDone;
+  }
+  const VePool pool = ve_pool(c, mesh);
+  std::vector<std::string> templates;
+  try {
+    templates = make_templates(local, pool.templates, [](std::string_view line) { std::cout << line << std::endl; });
+    options.versions.merge(engine_versions(local));
+  } catch (...) {
+    mpi.agree(false);
+    throw;
+  }
+  mpi.agree(true);
+  options.ranks = mpi.size;
+  VolumeElements points(MPI_COMM_WORLD, local, templates, templates_of_points(pool));
+  options.complete = [&](Summary& summary) {
+    summary.evaluate_seconds = points.statistics().seconds;
+    summary.trial_seconds = points.statistics().trial_seconds;
+    summary.engine_seconds = points.statistics().engine_seconds;
+    summary.peak_memory_workers = points.peak_memory();
+  };
+  return run_simulation(c, mesh, points, options);
+}
+
+int run(const Arguments& arguments) {
+  const Case c = read_case(arguments.case_file, arguments.overrides);
+  const Mesh mesh = make_mesh(c);
+  const RunOptions options = run_options(c, arguments);
+  if (c.material.type == MaterialType::volume_element) return run_on_volume_elements(c, mesh, options);
+  const Mpi mpi;
+  if (mpi.rank > 0) return kDone;  // laws in closed form cost nothing: rank 0 alone
+  return run_simulation(c, mesh, *make_analytic_points(c, mesh), options);
+}
+
+int check(const Arguments& arguments) {
+  const Case c = read_case(arguments.case_file, arguments.overrides);
+  const Mesh mesh = make_mesh(c);
+  std::cout << c.file << ": no mistakes; " << mesh.elements.size() << " elements, "
+            << kPointsPerElement * mesh.elements.size() << " material points\n";
+  return kDone;
+}
+
+}  // namespace
+}  // namespace femxdem
+
+int main(int argc, char** argv) {
+  using namespace femxdem;
+  setenv("OPENBLAS_NUM_THREADS", "1", 0);  // the ranks are the parallelism
+  setenv("OMP_NUM_THREADS", "1", 0);
+  Arguments arguments;
+  for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
+
+  CLI::App app("femxdem: finite elements whose material is a volume element of spheres in YADE");
+  app.require_subcommand(0, 1);
+  app.add_flag_callback(
+      "--version",
+      [] {
+        std::cout << describe_versions();
+        std::exit(kDone);
+      },
+      "Versions of the program and of what it uses, and what is missing");
+  const auto add_case = [&](CLI::App* command) {
+    command->add_option("case", arguments.case_file, "Case file (TOML)")->required();
+    command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
+  };
+  CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
+  add_case(run_command);
+  run_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
+  run_command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
+  add_case(check_command);
+  CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
+
+  try {
+    app.parse(argc, argv);
+    if (*run_command) return run(arguments);
+    if (*check_command) return check(arguments);
+    if (*parameters_command) std::cout << describe_parameters();
+    if (app.get_subcommands().empty()) std::cout << app.help();
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kBadInput;
+  } catch (const UserError& error) {
+    if (speaks()) std::cerr << error.what() << "\n";
+    return kBadInput;
+  } catch (const std::exception& error) {
+    std::cerr << "femxdem: " << error.what() << "\n";
+    return kPointFailed;
+  }
+}

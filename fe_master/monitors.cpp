@@ -1,0 +1,98 @@
+#include "monitors.hpp"
+
+#include <algorithm>
+
+namespace femxdem {
+namespace {
+
+double sum_over_edge(const Mesh& mesh, const std::string& edge, const Eigen::VectorXd& nodal, int component) {
+  double sum = 0;
+  for (const int node : edge_nodes(mesh, edge)) sum += nodal[2 * node + component];
+  return sum;
+}
+
+double mean_displacement(const Mesh& mesh, const std::string& edge, const Eigen::VectorXd& x, int component) {
+  return sum_over_edge(mesh, edge, x, component) / static_cast<double>(edge_nodes(mesh, edge).size());
+}
+
+double deformed_length(const Mesh& mesh, const std::string& edge, const Eigen::VectorXd& x) {
+  double length = 0;
+  for (const Side& side : mesh.edges.at(edge)) {
+    for (const EdgePoint& g : gauss_edge()) {
+      const Eigen::Vector3d dN = shape_gradient_edge(g.s);
+      Point2 tangent = Point2::Zero();
+      for (int a = 0; a < 3; ++a) tangent += dN[a] * (mesh.nodes[side.nodes[a]] + x.segment<2>(2 * side.nodes[a]));
+      length += g.weight * tangent.norm();
+    }
+  }
+  return length;
+}
+
+double pressure(const Case& c, const std::string& edge, double time) {
+  double sum = 0;
+  for (const Load& load : c.loads) {
+    if (load.kind == LoadKind::pressure && load.edge == edge)
+      sum += load.value * load_factor(load, time, c.control.end_time);
+  }
+  return sum;
+}
+
+double mean_stress(const Element& element, const std::string& region, const Equilibrium& state, int i, int j) {
+  double sum = 0, volume = 0;
+  const auto add = [&](std::size_t e) {
+    for (std::size_t p = kPointsPerElement * e; p < kPointsPerElement * (e + 1); ++p) {
+      const double weight = element.shapes(p).weight * state.F[p].determinant();
+      sum += weight * state.responses[p].stress(i, j);
+      volume += weight;
+    }
+  };
+  if (region.empty()) {
+    for (std::size_t e = 0; e < element.mesh().elements.size(); ++e) add(e);
+  } else {
+    for (const int e : element.mesh().regions.at(region)) add(static_cast<std::size_t>(e));
+  }
+  return sum / volume;
+}
+
+double value(const Case& c, const Element& element, const Equilibrium& state, const Monitor& monitor) {
+  const Mesh& mesh = element.mesh();
+  switch (monitor.quantity) {
+    case Quantity::reaction_x:
+      return sum_over_edge(mesh, monitor.edge, state.internal - state.external, 0);
+    case Quantity::reaction_y:
+      return sum_over_edge(mesh, monitor.edge, state.internal - state.external, 1);
+    case Quantity::displacement_x:
+      return mean_displacement(mesh, monitor.edge, state.x, 0);
+    case Quantity::displacement_y:
+      return mean_displacement(mesh, monitor.edge, state.x, 1);
+    case Quantity::length:
+      return deformed_length(mesh, monitor.edge, state.x);
+    case Quantity::pressure:
+      return pressure(c, monitor.edge, state.time);
+    case Quantity::stress_xx:
+      return mean_stress(element, monitor.region, state, 0, 0);
+    case Quantity::stress_yy:
+      return mean_stress(element, monitor.region, state, 1, 1);
+    case Quantity::stress_zz:
+      return mean_stress(element, monitor.region, state, 2, 2);
+    case Quantity::stress_xy:
+      return mean_stress(element, monitor.region, state, 0, 1);
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::vector<std::string> monitor_names(const Case& c) {
+  std::vector<std::string> names;
+  for (const Monitor& monitor : c.monitors) names.push_back(monitor.name);
+  return names;
+}
+
+std::vector<double> monitor_values(const Case& c, const Element& element, const Equilibrium& state) {
+  std::vector<double> values;
+  for (const Monitor& monitor : c.monitors) values.push_back(value(c, element, state, monitor));
+  return values;
+}
+
+}  // namespace femxdem

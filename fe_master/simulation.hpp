@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "case.hpp"
+#include "element.hpp"
+#include "material_points.hpp"
+#include "output_folder.hpp"
+#include "summary.hpp"
+
+namespace femxdem {
+
+/// Exit status of the program.
+enum ExitStatus : int {
+  kDone = 0,
+  kBadInput = 2,
+  kNotConverged = 3,  ///< every converged step is on the disk
+  kPointFailed = 4,   ///< a volume element failed and smaller steps did not help
+};
+
+/// Where and how a case is run.
+struct RunOptions {
+  std::filesystem::path folder;
+  Existing existing = Existing::refuse;  ///< resume: go on from checkpoint.h5 of the folder
+  int ranks = 1;
+  std::string command_line;
+  std::map<std::string, std::string> versions;
+  std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
+};
+
+/// Finite elements of a case on its mesh.
+std::unique_ptr<Element> make_element(const Case& c, const Mesh& mesh);
+
+/// Material points of a case whose material is a law in closed form.
+std::unique_ptr<MaterialPoints> make_analytic_points(const Case& c, const Mesh& mesh);
+
+/// Runs the boundary value problem of a case on its material points, with all its files: results.h5, results.xdmf,
+/// history.csv, summary.json, case.toml, log.txt, checkpoint.h5. Returns the exit status; throws UserError.
+int run_simulation(const Case& c, const Mesh& mesh, MaterialPoints& points, const RunOptions& options);
+
+}  // namespace femxdem
