@@ -180,23 +180,19 @@ Mesh read_model(const std::string& file) {
 
 Mesh gmsh_mesh(const std::string& file) {
   if (!std::filesystem::is_regular_file(file)) throw UserError(fmt::format("{}: no such file; give a Gmsh mesh", file));
+  const std::string extension = std::filesystem::path(file).extension().string();
+  if (extension != ".msh" && extension != ".geo")
+    throw UserError(fmt::format("{}: not a Gmsh file by its name; give a mesh (.msh) or a geometry (.geo)", file));
   const GmshSession session;
   try {
     gmsh::open(file);
     std::vector<int> types;
     std::vector<std::vector<std::size_t>> elements, element_nodes;
     gmsh::model::mesh::getElements(types, elements, element_nodes, 2);
-    if (types.empty() && std::filesystem::path(file).extension() == ".geo") gmsh::model::mesh::generate(2);
+    if (types.empty() && extension == ".geo") gmsh::model::mesh::generate(2);
     return read_model(file);
-  } catch (const UserError&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw UserError(
-        fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error.what()));
-  } catch (const std::string& error) {
+  } catch (const std::string& error) {  // what Gmsh's API throws
     throw UserError(fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error));
-  } catch (int) {
-    throw UserError(fmt::format("{}: Gmsh cannot read it; open it in Gmsh and export it again", file));
   }
 }
 
