@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 #include "tensor.hpp"
 
 namespace femxdem {
@@ -26,7 +28,8 @@ struct Cone {
 /// Isotropic elastoplastic increment of the Cauchy stress with the Jaumann rate: Hughes and Winget (1980), with the
 /// strain increment at mid-step between two half rotations (second order in the step; the classic form is first order):
 ///   G = 2 (F_rel - I) (F_rel + I)^-1,  sigma = Qh s Qh^T,  s = return(Qh sigma_n Qh^T + C : sym G),
-/// with Qh^2 the Cayley rotation of skew G. A rigid rotation is exact for any angle below 180 degrees.
+/// with Qh^2 the Cayley rotation of skew G. A rigid rotation is exact for any angle below 180 degrees; a rotation by
+/// theta together with a strain in ONE increment changes the strain by some 0.2 theta^2 of itself (order of the step).
 class ObjectiveUpdate {
  public:
   /// From the stress [Pa] and the plastic shear strain of the committed state along the relative gradient F F_n^-1.
