@@ -68,7 +68,14 @@ void PythonVolumeElements::add(const std::string& state, std::size_t count) {
   drop_trial();
   worker_.request(Command::add, static_cast<std::int64_t>(count), 0, state);
   const std::size_t first = size();
+  const VeInfo added = worker_.slot(first).info;
+  if (!(added.time_scale > 0 && std::isfinite(added.time_scale) && added.time_step > 0))
+    throw UserError(
+        fmt::format("volume element: mean stress {:.3g} Pa, time step {:.3g} s: without pressure the inertial "
+                    "number sets no rate; start from a state under compression",
+                    added.mean_stress, added.time_step));
   committed_stretch_.resize(first + count);
+  reference_time_scale_.resize(first + count, added.time_scale);
   frozen_steps_.resize(first + count, 0);
   for (std::size_t i = first; i < size(); ++i) adopt_stretch(i);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
@@ -117,7 +124,7 @@ PythonVolumeElements::Plan PythonVolumeElements::plan(std::size_t index, const T
   }
   slot.steps = 0;
   if (size < 1e-14) return plan;
-  const double rate = options_.inertial_number / slot.info.time_scale;
+  const double rate = options_.inertial_number / reference_time_scale_[index];
   const long needed = std::max<long>(options_.min_steps, std::lround(std::ceil(size / (rate * slot.info.time_step))));
   long& steps = frozen_steps_[index];
   if (steps == 0 || needed > 2 * steps) steps = needed;

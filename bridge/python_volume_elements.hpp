@@ -25,8 +25,9 @@ struct VolumeElementOptions {
 ///
 /// The cell is driven along the stretch only: F = R U, from the committed stretch U_n as measured to U along
 /// L = (U_inc^(1/n) - I) / dt, U_inc = U U_n^-1, and the answer is rotated by R. The number of steps
-/// n = max(min_steps, |ln U_inc| / (rate dt)) is frozen from the first trial of a load step on (unless a later one
-/// would need more than twice as many), so that the response is a smooth function of F.
+/// n = max(min_steps, |ln U_inc| / (rate dt)), rate = I / (a sqrt(rho / p)) with the pressure of the state that was
+/// added, is frozen from the first trial of a load step on (unless a later one would need more than twice as many), so
+/// that the response is a smooth function of F.
 class PythonVolumeElements : public LocalPoints {
  public:
   PythonVolumeElements(WorkerProcess& worker, VolumeElementOptions options);
@@ -41,9 +42,10 @@ class PythonVolumeElements : public LocalPoints {
   Template make_template(const std::string& specification_json);
   /// Versions of the engine and of Python, JSON.
   std::string versions();
-  /// Time step, time scale, size of volume element `index` in its committed state.
+  /// Time step, time scale, size of volume element `index` when it was added, saved or loaded.
   VeInfo info(std::size_t index) { return worker_.slot(index).info; }
 
+  /// Throws UserError for a state without pressure: it has no time scale.
   void add(const std::string& state, std::size_t count) override;
   std::uint64_t peak_memory() const override { return peak_memory_; }
   std::size_t size() const override { return committed_stretch_.size(); }
@@ -67,7 +69,8 @@ class PythonVolumeElements : public LocalPoints {
   WorkerProcess& worker_;
   VolumeElementOptions options_;
   std::vector<Tensor2> committed_stretch_;
-  std::vector<long> frozen_steps_;  ///< 0: to be chosen at the next trial
+  std::vector<double> reference_time_scale_;  ///< a sqrt(rho / p) when it was added [s]
+  std::vector<long> frozen_steps_;            ///< 0: to be chosen at the next trial
   std::uint64_t peak_memory_ = 0;
   bool trial_pending_ = false;
   bool trial_failed_ = false;

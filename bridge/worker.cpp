@@ -191,22 +191,14 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
   reply(message, ReplyKind::done, 1);
   const auto verdict = receive();
   if (!verdict || verdict->command != Command::commit) _exit(kOrderlyExit);
-  try {
-    adopt_trial(*verdict, committed);
-  } catch (const std::exception& error) {
-    reply_error(*verdict, error.what());
-    _exit(kOrderlyExit);
-  }
+  adopt_trial(*verdict, committed);
 }
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
-  std::vector<VeInfo> infos;
-  for (const int ve : ves_) infos.push_back(engine_.info(ve));
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
   batch_.child = 0;
   snapshot_.clear();
-  for (std::size_t i = 0; i < ves_.size(); ++i) batch_.slots[i].info = infos[i];
   reply(message, ReplyKind::done, getpid());
   while (getppid() == committed) usleep(100);  // until its memory is freed; then the rank is the parent
   die_with(rank_);
@@ -216,7 +208,6 @@ void Worker::commit_in_process(const Message& message) {
   if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
   trial_in_process_ = false;
   snapshot_.clear();
-  for (std::size_t i = 0; i < ves_.size(); ++i) batch_.slots[i].info = engine_.info(ves_[i]);
   reply(message, ReplyKind::done, getpid());
 }
 

@@ -81,7 +81,7 @@ struct Slot {
   std::array<double, kReportFields.size()> report{};
   std::array<double, 9> stretch{};     ///< deformation gradient of the cell from the reference
   std::array<double, 81> stiffness{};  ///< [Pa], when asked for
-  VeInfo info;                         ///< of the committed state
+  VeInfo info;                         ///< when it was added, saved or loaded
   std::array<char, 400> sentence{};    ///< why it failed, zero-terminated
 };
 

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+
+#include "python_volume_elements.hpp"
+
+/// Points with a history, in closed form, that complain on demand.
+namespace femxdem {
+
+/// Elastic cell whose stress also depends on the length of its path: sigma = R (E (U - I) + H s I) R^T, s the sum of
+/// |U - U_n|. A gradient with F_22 above 10 throws on the rank that holds the point.
+class PathLengthPoints : public LocalPoints {
+ public:
+  void add(const std::string& state, std::size_t count) override;
+  std::uint64_t peak_memory() const override { return 1000 + size(); }
+  std::size_t size() const override { return committed_.size(); }
+  std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
+  void commit() override { committed_ = trial_; }
+  SavedStates save() override;
+  void load(const SavedStates& states) override;
+
+  /// State at rest with modulus E [Pa].
+  static std::string at_rest(double modulus);
+
+ private:
+  struct State {
+    double modulus = 0;
+    double length = 0;
+    std::array<double, 9> U{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  };
+  Response respond(std::size_t index, const Tensor2& F, Operator wanted);
+
+  std::vector<State> committed_;
+  std::vector<State> trial_;
+};
+
+/// What a rank serves in the next test.
+enum class Law : int { path_length, dummy_engine };
+
+/// The farm on rank 0: tells the other ranks which law to serve and constructs the points on all of them.
+struct Farm {
+  Farm(Law law, const std::vector<std::string>& templates, const std::vector<int>& template_of_point);
+  std::unique_ptr<LocalPoints> local;
+  std::unique_ptr<VolumeElements> points;
+};
+
+/// The worker of this rank, started before MPI_Init.
+WorkerProcess& worker_of_this_rank();
+/// A second one on rank 0, for comparison.
+WorkerProcess& worker_for_comparison();
+
+}  // namespace femxdem

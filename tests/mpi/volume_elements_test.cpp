@@ -1,0 +1,127 @@
+#include "volume_elements.hpp"
+
+#include <unistd.h>
+
+#include "errors.hpp"
+#include "material_points_contract.hpp"
+#include "schedule.hpp"
+#include "served_points.hpp"
+
+namespace femxdem {
+namespace {
+
+using contract::expect_same_bits;
+using contract::gradients;
+using contract::part;
+using contract::trial;
+
+const std::vector<std::string> kTemplates = {PathLengthPoints::at_rest(1e8), PathLengthPoints::at_rest(3e7)};
+const std::vector<int> kSeven = {0, 0, 1, 0, 1, 1, 0};
+
+int ranks() {
+  int size = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  return size;
+}
+
+/// All points in one process, no farm.
+PathLengthPoints in_one_place(const std::vector<int>& template_of_point) {
+  PathLengthPoints points;
+  for (const int k : template_of_point) points.add(kTemplates[static_cast<std::size_t>(k)], 1);
+  return points;
+}
+
+TEST(Schedule, Cyclic) {
+  EXPECT_EQ(assign(5, 2), (std::vector<int>{0, 1, 0, 1, 0}));
+  EXPECT_EQ(assign(2, 4), (std::vector<int>{0, 1}));
+  EXPECT_THROW(assign(2, 0), std::invalid_argument);
+}
+
+TEST(VolumeElements, Contract) {
+  Farm farm(Law::path_length, kTemplates, kSeven);
+  contract::Tolerances tolerances;
+  tolerances.path = tolerances.strain * tolerances.strain;  // F goes straight, U does so up to the second order
+  tolerances.rotation =
+      20 * std::numeric_limits<double>::epsilon() / tolerances.strain;  // round-off of F, no prestress
+  contract::check(*farm.points, tolerances);
+}
+
+TEST(VolumeElements, SameBitsAsInOnePlace) {
+  for (const std::vector<int>& points : {kSeven, std::vector<int>{1, 0}}) {  // also fewer points than ranks
+    Farm farm(Law::path_length, kTemplates, points);
+    PathLengthPoints reference = in_one_place(points);
+    const auto F = gradients(points.size(), 1e-2);
+    for (const double fraction : {0.3, 0.6, 0.5, 1.0}) {
+      expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
+      farm.points->commit();
+      reference.commit();
+    }
+    EXPECT_EQ(farm.points->save(), reference.save());
+  }
+}
+
+TEST(VolumeElements, SameBitsWithWorkers) {
+  PythonVolumeElements reference(worker_for_comparison(), {});
+  std::vector<std::string> templates;
+  for (const char* specification : {"{}", R"({"youngs_modulus": 3e7})"})
+    templates.push_back(reference.make_template(specification).state);
+  for (const int k : kSeven) reference.add(templates[static_cast<std::size_t>(k)], 1);
+  Farm farm(Law::dummy_engine, templates, kSeven);
+  const auto F = gradients(kSeven.size(), 1e-3);
+  for (const double fraction : {0.3, 0.6, 0.5, 1.0}) {
+    expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
+    farm.points->commit();
+    reference.commit();
+  }
+  EXPECT_GT(farm.points->peak_memory(), static_cast<std::uint64_t>(ranks()) << 20);
+}
+
+TEST(VolumeElements, AnExceptionOnARankTravelsAndTheFarmGoesOn) {
+  Farm farm(Law::path_length, kTemplates, kSeven);
+  const auto F = gradients(kSeven.size(), 1e-2);
+  const auto before = trial(*farm.points, F);
+  for (std::size_t k = 0; k < kSeven.size(); ++k) {
+    auto G = F;
+    G[k](2, 2) = 11;
+    std::string said;
+    try {
+      farm.points->evaluate(G, Operator::elastic);
+    } catch (const std::runtime_error& error) {
+      said = error.what();
+    }
+    const int owner = assign(kSeven.size(), ranks())[k];
+    EXPECT_EQ(said, "rank " + std::to_string(owner) + ": stretched beyond belief");
+  }
+  expect_same_bits(before, trial(*farm.points, F));
+}
+
+TEST(VolumeElements, UsersMistakesStayUsersMistakes) {
+  EXPECT_THROW(Farm(Law::path_length, {"nonsense"}, {0, 0, 0, 0}), UserError);
+  Farm farm(Law::path_length, kTemplates, kSeven);
+  EXPECT_THROW(farm.points->load({"one"}), UserError);
+  EXPECT_THROW(farm.points->load(SavedStates(kSeven.size(), "nonsense")), UserError);
+  EXPECT_THROW(farm.points->evaluate(gradients(2, 1e-3), Operator::none), std::invalid_argument);
+}
+
+TEST(VolumeElements, StatisticsCount) {
+  Farm farm(Law::path_length, kTemplates, kSeven);
+  const auto F = gradients(kSeven.size(), 1e-2);
+  farm.points->evaluate(F, Operator::none);
+  farm.points->evaluate(F, Operator::none);
+  const FarmStatistics& statistics = farm.points->statistics();
+  EXPECT_EQ(statistics.batches, 2);
+  EXPECT_EQ(statistics.evaluations, 14);
+  EXPECT_EQ(statistics.dem_steps, 98);
+  EXPECT_GT(statistics.seconds, 0);
+  const std::uint64_t remote =
+      kSeven.size() - (kSeven.size() + static_cast<std::size_t>(ranks()) - 1) / static_cast<std::size_t>(ranks());
+  EXPECT_GE(statistics.bytes, 2 * remote * (72 + 72));
+  EXPECT_EQ(statistics.bytes == 0, ranks() == 1);
+  EXPECT_EQ(farm.points->peak_memory(), 1000 * static_cast<std::uint64_t>(ranks()) + kSeven.size());
+}
+
+/// Not run by itself: killed_rank.sh kills a rank meanwhile and looks for its worker.
+TEST(VolumeElements, DISABLED_Waits) { sleep(60); }
+
+}  // namespace
+}  // namespace femxdem
