@@ -63,6 +63,21 @@ std::optional<Mesh> mesh_of(const Case& c, Mistakes& m) {
   }
 }
 
+/// A point of a load outside the mesh's bounding box is a slip, not a place.
+void check_points(const Case& c, const Mesh& mesh, Mistakes& m) {
+  Eigen::AlignedBox2d box;
+  for (const Point2& x : mesh.nodes) box.extend(x);
+  const double slack = 1e-6 * box.diagonal().norm();
+  for (std::size_t i = 0; i < c.loads.size(); ++i) {
+    const auto& p = c.loads[i].point;
+    if (p.size() == 2 && box.exteriorDistance(Point2(p[0], p[1])) > slack)
+      m.add(
+          fmt::format("load.{}.point", i),
+          fmt::format("the point ({:g}, {:g}) lies outside the mesh, which spans ({:g}, {:g}) to ({:g}, {:g}); move it",
+                      p[0], p[1], box.min().x(), box.min().y(), box.max().x(), box.max().y()));
+  }
+}
+
 /// Names of the mesh's edges, as far as they can be known.
 std::optional<std::set<std::string>> edge_names(const Case& c, const std::optional<Mesh>& mesh, const Mistakes& m) {
   std::set<std::string> names;
@@ -296,6 +311,7 @@ void check_case(const Case& c, Purpose purpose, Mistakes& m) {
   if (mesh) {
     check_region_names(c.material_regions, "material.region", regions, m);
     check_region_names(c.ve_regions, "ve.region", regions, m);
+    check_points(c, *mesh, m);
   }
   const std::optional<std::set<std::string>> edges = edge_names(c, mesh, m);
   check_loads(c, edges, m);

@@ -184,6 +184,9 @@ TEST(Case, PathOfAPointNeedsNoMesh) {
   const Case c = read_case(file.string(), {}, Purpose::ve_path);
   EXPECT_EQ(c.path.at(0).increments, 20);
   EXPECT_EQ(c.ve.spheres, 200);
+  const fs::path copy = fs::path(testing::TempDir()) / "path_only_effective.toml";
+  std::ofstream(copy) << effective_toml(c);
+  EXPECT_EQ(effective_toml(read_case(copy.string(), {}, Purpose::ve_path)), effective_toml(c));
   EXPECT_NE(mistakes_of(file.string()).find("mesh.type is missing"), std::string::npos) << "but a run does";
   EXPECT_NE(mistakes_of(kGood, {"path=[]"}, Purpose::ve_path).find("there is no path to follow"), std::string::npos);
 }
