@@ -113,7 +113,7 @@ void Results::resume(int last_step) {
     if (std::stoi(step) > last_step) {
       h5.remove("/steps/" + step);
     } else {
-      grids_.push_back(grid(h5, step));
+      grids_[std::stoi(step)] = grid(h5, step);
     }
   }
 }
@@ -122,6 +122,7 @@ void Results::write(const FieldStep& step) {
   {
     Hdf5File h5(folder_ / kFile, Hdf5File::Mode::update);
     const std::string group = group_of(step.step);
+    if (h5.exists(group)) h5.remove(group);
     h5.make_group(group);
     h5.set_attribute(group, "step", step.step);
     h5.set_attribute(group, "time", step.time);
@@ -135,7 +136,7 @@ void Results::write(const FieldStep& step) {
       h5.write(group + "/points/" + field.name, field.values, {elements_, points, field.components});
       h5.write(group + "/cells/" + field.name, element_means(field, elements_), {elements_, field.components});
     }
-    grids_.push_back(grid(h5, fmt::format("{:06d}", step.step)));
+    grids_[step.step] = grid(h5, fmt::format("{:06d}", step.step));
   }
   write_xdmf();
 }
@@ -144,7 +145,7 @@ void Results::write_xdmf() const {
   std::string text =
       "<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
       "   <Grid Name=\"steps\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-  for (const std::string& grid : grids_) text += grid;
+  for (const auto& [step, grid] : grids_) text += grid;
   text += "   </Grid>\n  </Domain>\n</Xdmf>\n";
   replace_file(folder_ / "results.xdmf", text);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,11 +33,12 @@ struct FieldStep {
 /// Both files are complete and closed after every write: a run that ends early keeps everything written before.
 class Results {
  public:
-  /// The folder exists (prepare_output_folder). `points`: reference positions of the Gauss points [m], element by element. With Existing::resume the steps after
-  /// `last_step` are removed from the files; otherwise they are begun.
+  /// The folder exists (prepare_output_folder). `points`: reference positions of the Gauss points [m], element by
+  /// element. With Existing::resume the steps after `last_step` are removed from the files; otherwise they are begun.
   Results(const std::filesystem::path& folder, const Mesh& mesh, std::span<const Point2> points, Existing existing,
           int last_step = 0);
 
+  /// A step that is already there is replaced.
   void write(const FieldStep& step);
 
  private:
@@ -47,7 +49,7 @@ class Results {
   std::filesystem::path folder_;
   std::size_t nodes_;
   std::size_t elements_;
-  std::vector<std::string> grids_;  ///< XDMF text of each step written
+  std::map<int, std::string> grids_;  ///< XDMF text of each step written
 };
 
 }  // namespace femxdem

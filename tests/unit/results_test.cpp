@@ -60,6 +60,11 @@ std::vector<Point2> points_of_two_squares() {
   return points;
 }
 
+Results results_in(const fs::path& folder, Existing existing, int last_step = 0) {
+  prepare_output_folder(folder, existing);
+  return {folder, two_squares(), points_of_two_squares(), existing, last_step};
+}
+
 FieldStep step_number(int step) {
   FieldStep fields{step, 0.1 * step, 0.01 * step, {}, {}};
   Field displacement{"displacement", 2, {}};
@@ -71,7 +76,7 @@ FieldStep step_number(int step) {
 }
 
 TEST_F(ResultsTest, FieldsAreReadBackWithTheirShapes) {
-  Results results(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
+  Results results = results_in(folder_, Existing::refuse);
   results.write(step_number(7));
   const Hdf5File h5(folder_ / "results.h5", Hdf5File::Mode::read);
   EXPECT_EQ(h5.shape("/mesh/points"), (Shape{2, 4, 2}));
@@ -87,7 +92,7 @@ TEST_F(ResultsTest, FieldsAreReadBackWithTheirShapes) {
 }
 
 TEST_F(ResultsTest, CellsHoldTheMeansOfTheirPoints) {
-  Results results(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
+  Results results = results_in(folder_, Existing::refuse);
   FieldStep fields = step_number(1);
   fields.point_fields.push_back({"pair", 2, {1, 0, 1, 0, 1, 0, 5, 4, 0, 1, 0, 2, 0, 3, 0, 6}});
   results.write(fields);
@@ -97,7 +102,7 @@ TEST_F(ResultsTest, CellsHoldTheMeansOfTheirPoints) {
 }
 
 TEST_F(ResultsTest, XdmfNamesEveryStepAndItsDataSets) {
-  Results results(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
+  Results results = results_in(folder_, Existing::refuse);
   EXPECT_NE(text("results.xdmf").find("</Xdmf>"), std::string::npos);
   results.write(step_number(1));
   results.write(step_number(2));
@@ -115,22 +120,33 @@ TEST_F(ResultsTest, ResumedFilesEqualThoseOfAnUninterruptedRun) {
   const fs::path whole = folder_ / "whole";
   const fs::path parts = folder_ / "parts";
   {
-    Results results(whole, two_squares(), points_of_two_squares(), Existing::refuse);
+    Results results = results_in(whole, Existing::refuse);
     for (const int step : {1, 2, 3}) results.write(step_number(step));
   }
   {
-    Results results(parts, two_squares(), points_of_two_squares(), Existing::refuse);
+    Results results = results_in(parts, Existing::refuse);
     for (const int step : {1, 2, 4}) results.write(step_number(step));
   }
-  Results resumed(parts, two_squares(), points_of_two_squares(), Existing::resume, 2);
+  Results resumed = results_in(parts, Existing::resume, 2);
   resumed.write(step_number(3));
   EXPECT_EQ(text("parts/results.xdmf"), text("whole/results.xdmf"));
   const Hdf5File h5(parts / "results.h5", Hdf5File::Mode::read);
   EXPECT_EQ(h5.members("/steps"), (std::vector<std::string>{"000001", "000002", "000003"}));
 }
 
+TEST_F(ResultsTest, AStepWrittenTwiceIsThereOnce) {
+  Results results = results_in(folder_, Existing::refuse);
+  results.write(step_number(1));
+  const std::string once = text("results.xdmf");
+  FieldStep again = step_number(1);
+  again.time = 5;
+  results.write(again);
+  EXPECT_EQ(Hdf5File(folder_ / "results.h5", Hdf5File::Mode::read).number("/steps/000001", "time"), 5);
+  EXPECT_EQ(text("results.xdmf").size(), once.size() - std::string("0.10000000000000001").size() + 1);
+}
+
 TEST_F(ResultsTest, AReaderThatHoldsTheFileDoesNotStopTheRun) {
-  Results results(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
+  Results results = results_in(folder_, Existing::refuse);
   const pid_t reader = fork();
   if (reader == 0) {
     H5Fopen((folder_ / "results.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);  // with HDF5's own lock
@@ -144,9 +160,9 @@ TEST_F(ResultsTest, AReaderThatHoldsTheFileDoesNotStopTheRun) {
 }
 
 TEST_F(ResultsTest, EarlierResultsAreOverwrittenOnlyWhenAsked) {
-  { Results first(folder_, two_squares(), points_of_two_squares(), Existing::refuse); }
+  { Results first = results_in(folder_, Existing::refuse); }
   try {
-    Results second(folder_, two_squares(), points_of_two_squares(), Existing::refuse);
+    Results second = results_in(folder_, Existing::refuse);
     FAIL() << "overwrote";
   } catch (const UserError& error) {
     EXPECT_EQ(std::string(error.what()), folder_.string() +
@@ -154,7 +170,7 @@ TEST_F(ResultsTest, EarlierResultsAreOverwrittenOnlyWhenAsked) {
                                              "them with --overwrite or choose another --out");
   }
   std::ofstream(folder_ / "notes.md") << "mine";
-  Results third(folder_, two_squares(), points_of_two_squares(), Existing::overwrite);
+  Results third = results_in(folder_, Existing::overwrite);
   EXPECT_EQ(text("notes.md"), "mine");
 }
 
