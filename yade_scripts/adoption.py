@@ -1,50 +1,106 @@
-"""Any YADE scene with a periodic cell becomes a volume element.
+"""Any YADE scene of grains in a periodic cell becomes a volume element.
 
-What the program needs of a scene is its periodic cell, one collider, contact loops and one integrator. Everything that
-strains, stops, records or calls back is dropped: the finite elements drive the cell from then on.
+What the program needs of a scene is its periodic cell, one collider, one contact loop and one integrator; laws that are
+engines of their own stay too. Whatever strains, stops, records or calls back is dropped: the finite elements drive the
+cell from then on.
 """
 
-COLLIDERS = ("InsertionSortCollider",)
 KEPT = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
+DROPPED = (  # with everything derived from them
+    "BoundaryController",  # PeriTriaxController, Peri3dController, PeriIsoCompressor, ...
+    "PeriodicEngine",  # PyRunner, recorders, snapshots
+    "TimeStepper",
+    "FieldApplier",  # gravity
+)
+GRAINS = ("Sphere", "Clump")
 
 
 def adopt(O):
     """Makes the current scene of `O` a volume element at rest in its reference state.
 
-    Returns {"kept": [...], "dropped": [...], "reset": [...]}, engine names and sentences.
+    Returns {"kept": [...], "dropped": [...], "reset": [...]}, names of engines and sentences. Leaves O.dt at 0.
     Raises ValueError with the reason when the scene cannot serve.
     """
-    from yade.utils import Matrix3
-
-    _refuse_unsuitable(O)
-    kept, dropped, reset = [], [], []
-    for engine in O.engines:
-        (kept if type(engine).__name__ in KEPT and not engine.dead else dropped).append(engine)
-    dropped_names = [type(e).__name__ + (f" ({e.label})" if e.label else "") for e in dropped]
+    kept, dropped = _sort_engines(O)
+    _refuse_unsuitable(O, [type(e).__name__ for e in kept])
+    names = {"kept": [_name(e) for e in kept], "dropped": [_name(e) for e in dropped]}
     O.engines = kept
-    if O.cell.trsf != Matrix3.Identity:
-        reset.append("deformation gradient of the cell set to the identity")
-        O.cell.trsf = Matrix3.Identity
-    if O.cell.velGrad != Matrix3.Zero or O.cell.nextVelGrad != Matrix3.Zero:
-        reset.append("velocity gradient of the cell set to zero")
-        O.cell.velGrad = Matrix3.Zero
-    O.stopAtIter, O.stopAtTime = 0, 0.0
-    for b in O.bodies:
-        b.state.refPos, b.state.refOri = b.state.pos, b.state.ori
-    return {"kept": [type(e).__name__ for e in kept], "dropped": dropped_names, "reset": reset}
+    return {**names, "reset": _reset(O, kept[-1])}
 
 
-def _refuse_unsuitable(O):
+def _sort_engines(O):
+    droppable = {name for base in DROPPED for name in (base, *_derived(O, base))}
+    kept, dropped = [], []
+    for engine in O.engines:
+        name = type(engine).__name__
+        if engine.dead or name in droppable:
+            dropped.append(engine)
+        elif name in KEPT or name.startswith("Law2_"):
+            kept.append(engine)
+        else:
+            raise ValueError(
+                f"The YADE scene has the engine {_name(engine)}, which acts on the grains in a way that a volume element "
+                "cannot have: take it out of O.engines at the end of the script."
+            )
+    return kept, dropped
+
+
+def _derived(O, base):
+    children = set(O.childClassesNonrecursive(base))
+    return children.union(*(_derived(O, child) for child in children)) if children else children
+
+
+def _name(engine):
+    return type(engine).__name__ + (f" ({engine.label})" if engine.label else "")
+
+
+def _refuse_unsuitable(O, names):
     if not O.periodic:
         raise ValueError("The YADE scene has no periodic cell (O.periodic is False): a volume element needs one.")
-    names = [type(e).__name__ for e in O.engines if not e.dead]
     for needed in KEPT:
         if names.count(needed) != 1:
             raise ValueError(
-                f"The YADE scene has {names.count(needed)} engines {needed}, a volume element needs exactly one; its "
-                f"engines are {', '.join(names) or 'none'}."
+                f"The YADE scene has {names.count(needed)} engines {needed}, a volume element needs exactly one; it keeps "
+                f"{', '.join(names) or 'no engine'}."
             )
-    if names.index("NewtonIntegrator") < names.index("InteractionLoop"):
-        raise ValueError("The YADE scene moves its bodies before it finds their contacts: put NewtonIntegrator last.")
-    if len(O.bodies) == 0 or O.interactions.countReal() == 0:
+    if names[-1] != "NewtonIntegrator" or names.index("ForceResetter") > names.index("InteractionLoop"):
+        raise ValueError(
+            f"The YADE scene runs its engines in the order {', '.join(names)}: ForceResetter must come before the contacts "
+            "and NewtonIntegrator last."
+        )
+    for b in O.bodies:
+        shape = type(b.shape).__name__
+        if shape not in GRAINS:
+            raise ValueError(
+                f"Body {b.id} of the YADE scene is a {shape}: a volume element is made of grains ({', '.join(GRAINS)}) "
+                "in a periodic cell, without walls."
+            )
+        if not b.dynamic and not b.isClumpMember:
+            raise ValueError(f"Body {b.id} of the YADE scene is held (dynamic is False): every grain must be free.")
+    if O.interactions.countReal() == 0:
         raise ValueError("The YADE scene has no contacts: a volume element must carry a stress.")
+
+
+def _reset(O, integrator):
+    """Puts the scene at rest in its reference state; sentences on what had to be changed."""
+    from yade.utils import Matrix3, Vector3
+
+    done = []
+    if O.cell.homoDeform != 2:
+        done.append("homoDeform of the cell set to 2 (positions and velocities follow the cell)")
+        O.cell.homoDeform = 2
+    if O.cell.velGrad != Matrix3.Zero or O.cell.nextVelGrad != Matrix3.Zero:
+        done.append("velocity gradient of the cell set to zero")
+        O.cell.velGrad = Matrix3.Zero
+    O.dt = 0.0
+    O.step()  # YADE applies a new velocity gradient in the integrator: one step that takes no time
+    if O.cell.trsf != Matrix3.Identity:
+        done.append("deformation gradient of the cell set to the identity")
+        O.cell.trsf = Matrix3.Identity
+    if integrator.gravity != Vector3.Zero:
+        done.append("gravity set to zero")
+        integrator.gravity = Vector3.Zero
+    O.stopAtIter, O.stopAtTime = 0, 0.0
+    for b in O.bodies:
+        b.state.refPos, b.state.refOri = b.state.pos, b.state.ori
+    return done

@@ -45,6 +45,11 @@ def _positions_by_id(O):
     return x
 
 
+def has_stiffness(c):
+    """Whether the contacts' physics know their stiffnesses kn and ks."""
+    return bool(c.phys) and hasattr(c.phys[0], "kn") and hasattr(c.phys[0], "ks")
+
+
 def values(c, name):
     """(m,) attribute `name` of the contacts' physics."""
     return np.fromiter(map(attrgetter(name), c.phys), float, len(c.phys))

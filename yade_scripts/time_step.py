@@ -2,9 +2,24 @@
 
 import numpy as np
 
-from contact_loop import values
+from contact_loop import contacts, has_stiffness, values
 
-ITERATIONS = 100
+ITERATIONS = 60
+
+
+def safe_time_step(O, own, safety):
+    """Time step [s] for the scene and where it comes from: `safety` times the critical step of the contact network; for
+    clumps and contacts without kn and ks, whose network is not known here, the smaller of the scene's `own` step [s] and
+    `safety` times YADE's estimate by P waves."""
+    from yade.utils import PWaveTimeStep
+
+    c = contacts(O)
+    if has_stiffness(c) and not any(b.isClump for b in O.bodies):
+        return safety * critical_time_step(O, c), "contact network"
+    waves = safety * PWaveTimeStep()
+    if 0 < own < waves:
+        return own, "the scene"
+    return waves, "P waves"
 
 
 def critical_time_step(O, c):

@@ -10,10 +10,11 @@ import numpy as np
 import adoption
 import contact_loop
 import packing
+import user_scenes
 import yade_modules
-from time_step import critical_time_step
+from time_step import safe_time_step
 
-DEFAULTS = {"source": "prepare", "time_step_safety": 0.8}
+DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_seconds": 600.0}
 
 
 @dataclass
@@ -30,7 +31,8 @@ class _Trial:
 class _Grains:
     """What does not change while a VE lives."""
 
-    radius: np.ndarray  # (n,) [m]; 0 for a body that is no sphere
+    count: int
+    radius: np.ndarray  # (bodies,) [m]; 0 for a clump
     solid_volume: float  # [m^3]
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
@@ -56,12 +58,10 @@ class Engine:
     def make_template(self, spec):
         started = time.perf_counter()
         spec = {**DEFAULTS, **spec}
-        self.O.reset()
-        if spec["source"] != "prepare":
-            raise ValueError(f"ve.source = \"{spec['source']}\" is unknown: use \"prepare\".")
-        packing.prepare(self.O, spec)
-        manifest = {"source": spec["source"], **adoption.adopt(self.O)}
-        self.O.dt = spec["time_step_safety"] * critical_time_step(self.O, contact_loop.contacts(self.O))
+        manifest = {"source": spec["source"], "notes": self._make_scene(spec)}
+        own = self.O.dt
+        manifest.update(adoption.adopt(self.O))
+        self.O.dt, manifest["time_step_from"] = safe_time_step(self.O, own, spec["time_step_safety"])
         self._to_forces()
         grains = _grains(self.O)
         manifest.update(self._geometry(grains), **self._state_of_contacts(grains))
@@ -69,6 +69,19 @@ class Engine:
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
         return {"state": self.O.sceneToString(), "manifest": manifest}
+
+    def _make_scene(self, spec):
+        """Fills the current scene as the case says; sentences on what was special."""
+        self.O.reset()
+        if spec["source"] == "prepare":
+            packing.prepare(self.O, spec)
+            return []
+        if spec["source"] == "scene":
+            user_scenes.load_scene(self.O, spec["scene"])
+            return []
+        if spec["source"] == "script":
+            return user_scenes.run_script(self.O, spec["script"], spec["arguments"], spec["script_seconds"])
+        raise ValueError(f"ve.source = \"{spec['source']}\" is unknown: use \"prepare\", \"scene\" or \"script\".")
 
     def add(self, state):
         ve = self._free.pop() if self._free else self.O.addScene()
@@ -136,6 +149,11 @@ class Engine:
     def stiffness(self, ve, out_stiffness):
         self._select(ve)
         c = contact_loop.contacts(self.O)
+        if not contact_loop.has_stiffness(c):
+            raise RuntimeError(
+                f"The contacts of this volume element ({type(c.phys[0]).__name__}) have no kn and ks, so Eq. (2) cannot be "
+                "formed: use a stiffness by perturbation."
+            )
         kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
         out_stiffness[:] = contact_loop.stiffness(c, kn, kt, self.O.cell.volume).ravel()
 
@@ -158,7 +176,7 @@ class Engine:
             "time_step": self.O.dt,
             "time_scale": _time_scale(grains, pressure),
             "volume": self.O.cell.volume,
-            "spheres": len(self.O.bodies),
+            "spheres": grains.count,
             "mean_diameter": grains.mean_diameter,
             "mean_stress": float(pressure),
         }
@@ -166,8 +184,8 @@ class Engine:
     def _state_of_contacts(self, grains):
         """The numbers of a report that follow from the contacts."""
         c = contact_loop.contacts(self.O)
-        m, n = len(c.phys), len(self.O.bodies)
-        per_grain = np.bincount(c.ids.ravel(), minlength=n)
+        m, n = len(c.phys), grains.count
+        per_grain = np.bincount(c.ids.ravel())
         backbone = per_grain[per_grain > 1]
         return {
             "contacts": m,
@@ -181,10 +199,12 @@ class Engine:
 
 
 def _grains(O):
+    """Clumps count as one grain of the mass that YADE gives them; the mean diameter is that of the spheres."""
     radius = np.array([getattr(b.shape, "radius", 0.0) for b in O.bodies])
-    solid = 4 / 3 * math.pi * float((radius**3).sum())
-    mass = sum(b.state.mass for b in O.bodies)
-    return _Grains(radius, solid, 2 * float(radius.mean()), mass / solid)
+    density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
+    grains = [b for b in O.bodies if not b.isClumpMember]
+    solid = sum(b.state.mass for b in grains) / density
+    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density)
 
 
 def _time_scale(grains, pressure):
