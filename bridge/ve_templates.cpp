@@ -46,24 +46,26 @@ std::map<std::string, std::string> parse_strings(const std::string& json) {
 
 }  // namespace
 
+TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve) {
+  const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
+  const std::string name = key_of(ve, ve_spec_json(ve), elements.versions());
+  return {folder / (name + ".state"), folder / (name + ".json")};
+}
+
 std::vector<std::string> make_templates(PythonVolumeElements& elements, const std::vector<VeParameters>& pool,
                                         const std::function<void(std::string_view)>& say) {
-  const std::string versions = elements.versions();
   std::vector<std::string> states;
   for (const VeParameters& ve : pool) {
-    const std::string specification = ve_spec_json(ve);
-    const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
-    const std::string name = key_of(ve, specification, versions);
-    const fs::path state = folder / (name + ".state"), manifest = folder / (name + ".json");
+    const auto [state, manifest] = template_files(elements, ve);
     if (fs::exists(state) && fs::exists(manifest)) {
       states.push_back(read_file(state));
       say(fmt::format("volume element {} of {}: {}", states.size(), pool.size(), state.string()));
       continue;
     }
     const auto start = std::chrono::steady_clock::now();
-    const auto made = elements.make_template(specification);
+    const auto made = elements.make_template(ve_spec_json(ve));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    fs::create_directories(folder);
+    fs::create_directories(state.parent_path());
     replace_file(manifest, made.manifest);
     replace_file(state, made.state);
     states.push_back(made.state);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>
@@ -10,6 +11,13 @@
 #include "python_volume_elements.hpp"
 
 namespace femxdem {
+
+/// Where the cache holds a prepared volume element.
+struct TemplateFiles {
+  std::filesystem::path state;
+  std::filesystem::path manifest;  ///< JSON
+};
+TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve);
 
 /// States of the volume elements that a case starts from, one per entry of `pool`: from the cache folder where they
 /// are, else prepared (or adopted from a scene or a user's script) and put there with their manifests.

@@ -12,6 +12,7 @@
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "simulation.hpp"
+#include "ve_commands.hpp"
 #include "ve_templates.hpp"
 #include "versions.hpp"
 #include "volume_elements.hpp"
@@ -25,6 +26,7 @@ struct Arguments {
   std::vector<std::string> overrides;
   bool restart = false;
   bool overwrite = false;
+  int noise_samples = 0;
   std::string command_line;
 };
 
@@ -53,17 +55,26 @@ bool speaks() {
   return rank == nullptr || std::string(rank) == "0";
 }
 
-RunOptions run_options(const Case& c, const Arguments& arguments) {
+RunOptions run_options(const Arguments& arguments) {
   RunOptions options;
-  options.folder = !arguments.folder.empty()     ? std::filesystem::path(arguments.folder)
-                   : !c.output.directory.empty() ? std::filesystem::path(c.output.directory)
-                                                 : std::filesystem::path("out") / std::filesystem::path(c.file).stem();
+  options.folder = arguments.folder;
   options.existing = arguments.restart     ? Existing::resume
                      : arguments.overwrite ? Existing::overwrite
                                            : Existing::refuse;
   options.command_line = arguments.command_line;
   options.versions = library_versions();
   return options;
+}
+
+RunOptions run_options(const Case& c, const Arguments& arguments) {
+  RunOptions options = run_options(arguments);
+  if (options.folder.empty()) options.folder = c.output.directory;
+  if (options.folder.empty()) options.folder = std::filesystem::path("out") / std::filesystem::path(c.file).stem();
+  return options;
+}
+
+VeArguments ve_arguments(const Arguments& arguments) {
+  return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.noise_samples};
 }
 
 std::vector<int> templates_of_points(const VePool& pool) {
@@ -152,10 +163,29 @@ int main(int argc, char** argv) {
   add_case(check_command);
   CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
 
+  CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect");
+  ve_command->require_subcommand(1);
+  CLI::App* path_command = ve_command->add_subcommand("path", "Follow the [[path]] of a case with one material point");
+  add_case(path_command);
+  path_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
+  path_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  path_command
+      ->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
+      ->check(CLI::Range(3, 1000));
+  CLI::App* prepare_command = ve_command->add_subcommand("prepare", "Make the volume elements of a case");
+  add_case(prepare_command);
+  CLI::App* inspect_command =
+      ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");
+  add_case(inspect_command);
+  inspect_command->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
+
   try {
     app.parse(argc, argv);
     if (*run_command) return run(arguments);
     if (*check_command) return check(arguments);
+    if (*path_command) return ve_path(ve_arguments(arguments));
+    if (*prepare_command) return ve_prepare(ve_arguments(arguments));
+    if (*inspect_command) return ve_inspect(ve_arguments(arguments));
     if (*parameters_command) std::cout << describe_parameters();
     if (app.get_subcommands().empty()) std::cout << app.help();
     return kDone;

@@ -23,24 +23,6 @@ namespace {
 
 constexpr double kTimeRoundOff = 1e-9;  // of the end time: a step that would leave less goes to the end
 
-AnalyticLaw make_law(const MaterialParameters& m) {
-  constexpr double degree = std::numbers::pi / 180;
-  switch (m.type) {
-    case MaterialType::jaumann:
-      return JaumannLaw{m.young, m.poisson, m.initial_pressure};
-    case MaterialType::von_mises:
-      return VonMisesLaw{m.young, m.poisson, m.yield_stress, m.hardening, m.residual_stress, m.initial_pressure};
-    case MaterialType::drucker_prager:
-      return DruckerPragerLaw{
-          m.young,     m.poisson,         m.cohesion,        m.friction_angle * degree, m.dilatancy_angle * degree,
-          m.hardening, m.residual_stress, m.initial_pressure};
-    case MaterialType::bilinear:
-      return BilinearLaw{m.A1, m.A2, m.limit_strain, m.residual_stress, 0};
-    default:
-      return ElasticLaw{m.young, m.poisson, m.initial_pressure};
-  }
-}
-
 /// The time loop of one run and the files that it fills.
 class Run {
  public:
@@ -282,6 +264,24 @@ std::unique_ptr<Element> make_element(const Case& c, const Mesh& mesh) {
   std::array<double, 5> a{};
   std::copy_n(c.element.mindlin.begin(), 5, a.begin());
   return std::make_unique<SecondGradientQ8>(mesh, mindlin_law(a), 0.0);
+}
+
+AnalyticLaw make_law(const MaterialParameters& m) {
+  constexpr double degree = std::numbers::pi / 180;
+  switch (m.type) {
+    case MaterialType::jaumann:
+      return JaumannLaw{m.young, m.poisson, m.initial_pressure};
+    case MaterialType::von_mises:
+      return VonMisesLaw{m.young, m.poisson, m.yield_stress, m.hardening, m.residual_stress, m.initial_pressure};
+    case MaterialType::drucker_prager:
+      return DruckerPragerLaw{
+          m.young,     m.poisson,         m.cohesion,        m.friction_angle * degree, m.dilatancy_angle * degree,
+          m.hardening, m.residual_stress, m.initial_pressure};
+    case MaterialType::bilinear:
+      return BilinearLaw{m.A1, m.A2, m.limit_strain, m.residual_stress, 0};
+    default:
+      return ElasticLaw{m.young, m.poisson, m.initial_pressure};
+  }
 }
 
 std::unique_ptr<MaterialPoints> make_analytic_points(const Case& c, const Mesh& mesh) {

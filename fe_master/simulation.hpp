@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "analytic_laws.hpp"
 #include "case.hpp"
 #include "element.hpp"
 #include "material_points.hpp"
@@ -34,6 +35,9 @@ struct RunOptions {
 
 /// Finite elements of a case on its mesh.
 std::unique_ptr<Element> make_element(const Case& c, const Mesh& mesh);
+
+/// The law in closed form of a case's material.
+AnalyticLaw make_law(const MaterialParameters& m);
 
 /// Material points of a case whose material is a law in closed form.
 std::unique_ptr<MaterialPoints> make_analytic_points(const Case& c, const Mesh& mesh);
