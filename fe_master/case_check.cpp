@@ -285,7 +285,7 @@ void complete_case(Case& c, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
   if (!is_given(c.solver.tolerance)) c.solver.tolerance = ve ? 5e-3 : 1e-8;
-  if (!is_given(c.solver.displacement_tolerance)) c.solver.displacement_tolerance = ve ? 1e-2 : 1e-6;
+  if (!is_given(c.solver.displacement_tolerance)) c.solver.displacement_tolerance = ve ? 0.1 : 1e-6;
   if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
   if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
   const auto complete_ve = [&](VeParameters& v, bool cohesion_given) {

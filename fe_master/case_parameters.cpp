@@ -221,7 +221,7 @@ Section<SolverParameters> solver_section() {
        parameter("tolerance", &S::tolerance, "", {0.0, 1.0, true},
                  "force residual / reactions and loads; default 5e-3 for volume elements, 1e-8 for closed forms"),
        parameter("displacement_tolerance", &S::displacement_tolerance, "", kPositive,
-                 "correction / displacement of the step; default 1e-2 for volume elements, 1e-6 for closed forms"),
+                 "correction / displacement of the step; default 0.1 for volume elements, 1e-6 for closed forms"),
        parameter("max_iterations", &S::max_iterations, "", kAtLeastOne, "then the step is cut"),
        parameter("accept_best_factor", &S::accept_best_factor, "", kAtLeastOne,
                  "the best iterate is accepted, and flagged, below this times the tolerance"),
