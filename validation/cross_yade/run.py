@@ -1,0 +1,212 @@
+#!/usr/bin/python3
+"""One element driven by the finite-element master against YADE alone, on the same packings.
+
+    validation/cross_yade/run.py [--femxdem PROGRAM] [--out FOLDER] [--spheres N] [--seeds 1 2 3] [--paths NAME ...]
+
+Writes FOLDER/table.csv, table.md and cross_yade.png; curves that are there already are not computed again.
+"""
+
+import argparse
+import csv
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from paths import CONFINING_STRESS, INCREMENT, PATHS
+
+HERE = Path(__file__).resolve().parent
+LAWS = {"cohesive": 'contact_law = "adhesive"\ncohesion = 1.0', "cohesionless": 'contact_law = "friction"\ncohesion = 0.0'}
+INERTIAL_NUMBER = 5e-3
+SERIES = ("element", "yade", "yade_half_rate")
+STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_xy")
+
+CASE = """# Made by validation/cross_yade/run.py: the volume element of one packing on one path.
+[material]
+type = "volume_element"
+
+[ve]
+cache = "{cache}"
+spheres = {spheres}
+seed = {seed}
+confining_stress = {stress!r}
+inertial_number = {inertial_number!r}
+max_unbalanced_force = 1.0
+{law}
+
+[solver]
+tolerance = 1e-3
+
+{path}"""
+
+
+def sh(command, log):
+    with open(log, "a") as stream:
+        subprocess.run([str(word) for word in command], check=True, stdout=stream, stderr=stream)
+
+
+def case_file(folder, law, seed, path, spheres):
+    file = folder / "cases" / f"{law}_{seed}_{path.name}.toml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    text = CASE.format(cache="../packings", spheres=spheres, seed=seed, stress=CONFINING_STRESS,
+                       inertial_number=INERTIAL_NUMBER, law=LAWS[law], path=path.segments())
+    file.write_text(text)
+    return file
+
+
+def packing(program, case):
+    """State file of a case's volume element and its manifest, prepared where the cache does not have it."""
+    text = subprocess.run([program, "ve", "prepare", case], check=True, capture_output=True, text=True).stdout
+    state = Path(re.search(r"(\S+\.state)", text)[1])
+    return state, json.loads(state.with_suffix(".json").read_text())
+
+
+def compute(program, folder, law, seed, path, spheres):
+    """The three curves of one packing on one path, as files."""
+    case = case_file(folder, law, seed, path, spheres)
+    log = folder / "log.txt"
+    run = folder / "element" / case.stem
+    if not done(run):
+        sh([program, "ve", "path", case, "--out", run, "--overwrite"], log)
+    missing = [name for name in SERIES[1:] if not yade_curve(folder, case, name).exists()]
+    if not missing:
+        return case
+    state, manifest = packing(program, case)
+    for name in missing:
+        rate = INERTIAL_NUMBER / manifest["time_scale"] / (2 if name == "yade_half_rate" else 1)
+        curve = yade_curve(folder, case, name)
+        curve.parent.mkdir(exist_ok=True)
+        sh(["/usr/bin/python3", HERE / "yade_alone.py", state, path.name, rate, curve], log)
+    return case
+
+
+def done(run):
+    summary = run / "summary.json"
+    return summary.exists() and json.loads(summary.read_text())["status"] == "done"
+
+
+def yade_curve(folder, case, name):
+    return folder / name / f"{case.stem}.csv"
+
+
+def columns(file):
+    with open(file, newline="") as stream:
+        rows = list(csv.reader(stream))
+    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T))
+
+
+def curve(folder, case, name, path):
+    """Stresses over sigma_0 (points, 4), compression positive but shear as it is, and volumetric strain, at the element's
+    increments of the way that the driven strain has gone."""
+    c = columns(folder / "element" / case.stem / "history.csv" if name == "element" else yade_curve(folder, case, name))
+    if name == "element":
+        c["shear"] = c["F_12"]
+    driven = c["shear"] if path.name == "simple_shear" else c["strain_yy"]
+    way = np.concatenate([[0], np.abs(np.diff(driven)).cumsum()])
+    stress = np.stack([c[s] for s in STRESSES], axis=1) / CONFINING_STRESS * np.array([-1, -1, -1, 1])
+    volume = c["strain_xx"] + c["strain_yy"] + c["strain_zz"]
+    length = np.abs(np.diff((0,) + path.targets)).sum()
+    grid = np.linspace(0, length, max(2, round(length / INCREMENT)) + 1)
+    at = lambda values: np.interp(grid, way, values)
+    turned = np.concatenate([[0], np.abs(np.diff((0,) + path.targets)).cumsum()])
+    return np.interp(grid, turned, (0,) + path.targets), np.stack([at(s) for s in stress.T], axis=1), at(volume)
+
+
+def distance(one, other):
+    """Root mean square over the path of the difference of stress over that of the stress, and of the volumetric strain."""
+    rms = lambda x: float(np.sqrt(np.mean(np.sum(np.atleast_2d(x.T).T ** 2, axis=-1))))
+    return rms(one[1] - other[1]) / rms(other[1]), rms((one[2] - other[2])[:, None])
+
+
+def table_row(curves):
+    """Distances of one packing on one path: element from YADE, YADE from itself at half the rate."""
+    element, yade, slow = (curves[name] for name in SERIES)
+    return distance(element, yade) + distance(element, slow) + distance(yade, slow)
+
+
+def scatter(curves_of_seeds):
+    """Distance of YADE's curves of the seeds from their mean, averaged."""
+    yade = [curves["yade"] for curves in curves_of_seeds]
+    mean = (yade[0][0], np.mean([c[1] for c in yade], axis=0), np.mean([c[2] for c in yade], axis=0))
+    return np.mean([distance(c, mean) for c in yade], axis=0)
+
+
+HEADER = ("law", "path", "seed", "element_yade", "element_yade_volume", "element_slow_yade", "element_slow_yade_volume",
+          "yade_slow_yade", "yade_slow_yade_volume")
+
+
+def write_tables(folder, results):
+    """table.csv: every packing; table.md: means over the seeds, in per cent."""
+    with open(folder / "table.csv", "w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(HEADER)
+        for (law, name), curves_of_seeds in results.items():
+            for seed, curves in curves_of_seeds.items():
+                writer.writerow([law, name, seed] + [f"{x:.3e}" for x in table_row(curves)])
+    lines = ["| law | path | element - YADE [%] | element - YADE at half rate [%] | YADE - YADE at half rate [%] | seeds [%] |",
+             "|---|---|---|---|---|---|"]
+    for (law, name), curves_of_seeds in results.items():
+        rows = np.array([table_row(curves) for curves in curves_of_seeds.values()])
+        seeds = scatter(list(curves_of_seeds.values()))
+        pairs = list(100 * rows.mean(axis=0).reshape(3, 2)) + [100 * seeds]
+        volume = PATHS[name].held
+        text = [f"{s:.2f} ({v:.3f})" if volume else f"{s:.2f}" for s, v in pairs]
+        lines.append(f"| {law} | {name.replace('_', ' ')} | " + " | ".join(text) + " |")
+    (folder / "table.md").write_text("\n".join(lines) + "\n")
+
+
+def draw(folder, results):
+    names = list(dict.fromkeys(name for _, name in results))
+    laws = list(dict.fromkeys(law for law, _ in results))
+    figure, axes = plt.subplots(len(laws), len(names), figsize=(2.6 * len(names), 2.6 * len(laws)), squeeze=False)
+    for (law, name), curves_of_seeds in results.items():
+        one = axes[laws.index(law)][names.index(name)]
+        component = 3 if name == "simple_shear" else 1
+        for k, curves in enumerate(curves_of_seeds.values()):
+            for series, style in (("yade", "-"), ("yade_half_rate", ":"), ("element", ".")):
+                x, stress, _ = curves[series]
+                one.plot(100 * np.abs(x), stress[:, component], style, color=f"C{k}", markersize=2.5, linewidth=0.8)
+        one.set_title(f"{law}, {name.replace('_', ' ')}", fontsize=7)
+        one.tick_params(labelsize=6)
+        one.grid(alpha=0.3)
+    for one in axes[-1]:
+        one.set_xlabel("|driven strain| [%]", fontsize=7)
+    for row in axes:
+        row[0].set_ylabel(r"$\sigma_{yy}/\sigma_0$ (shear: $\sigma_{xy}/\sigma_0$)", fontsize=7)
+    figure.suptitle("points: element; lines: YADE alone (dotted: half the rate); colours: seeds", fontsize=8)
+    figure.tight_layout()
+    figure.savefig(folder / "cross_yade.png", dpi=90)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
+    parser.add_argument("--out", type=Path, default=Path("out/cross_yade"))
+    parser.add_argument("--spheres", type=int, default=1000)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS))
+    parser.add_argument("--paths", nargs="+", choices=PATHS, default=list(PATHS))
+    a = parser.parse_args()
+    program, folder = Path(a.femxdem).resolve(), a.out.resolve()
+    results = {}
+    for seed in a.seeds:
+        for law in a.laws:
+            for name in a.paths:
+                case = compute(program, folder, law, seed, PATHS[name], a.spheres)
+                curves = {series: curve(folder, case, series, PATHS[name]) for series in SERIES}
+                results.setdefault((law, name), {})[seed] = curves
+                print(law, seed, name, " ".join(f"{x:.2e}" for x in table_row(curves)), flush=True)
+    write_tables(folder, results)
+    draw(folder, results)
+    print((folder / "table.md").read_text())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
