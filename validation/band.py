@@ -133,7 +133,8 @@ def measure_band(positions, values):
     for _ in range(8):
         found = profiles(field, inclination, centre, np.linalg.norm(upper - lower), spacing)
         if len(found) < 3:
-            raise ResultsError("no band: the strain falls below half of its peak on both sides nowhere along the strongest line")
+            raise ResultsError("no band: nowhere along its strongest line does the strain fall below half of its peak on both sides; "
+                               "measure the strain since a later step (--from)")
         # Stations that slid onto another band lie far from the line of the others.
         _, across = axes_of(inclination)
         offset = (found[:, :2] - np.median(found[:, :2], axis=0)) @ across

@@ -18,15 +18,16 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 
 from results import (ResultsError, axial_curve, natural_coordinates, path_curve, read_history, read_mesh, read_step,
                      shape_functions)
 
 LABELS = {
-    "strain_invariant": r"second invariant of strain $|\mathrm{dev}\,\ln U|$",
-    "volumetric_strain": "volumetric strain (dilation positive)",
+    "strain_invariant": "second invariant\n" r"of strain $|\mathrm{dev}\,\ln U|$",
+    "volumetric_strain": "volumetric strain\n(dilation positive)",
     "porosity": "porosity",
-    "seconds": "DEM seconds of the last trial",
+    "seconds": "DEM seconds\nof the last trial",
 }
 
 
@@ -59,7 +60,8 @@ def draw_map(axes, mesh, step, name):
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.figure.colorbar(filled, ax=axes, orientation="horizontal", pad=0.03, label=LABELS.get(name, name))
+    bar = axes.figure.colorbar(filled, ax=axes, orientation="horizontal", pad=0.03, label=LABELS.get(name, name))
+    bar.locator = MaxNLocator(4)
 
 
 def draw_curves(axes, curves):
@@ -76,6 +78,7 @@ def draw_cost(axes, history):
     """Evaluations of all material points and accepted residual, step by step."""
     axes.bar(history["step"], history["evaluations"], width=0.8, color="tab:blue")
     axes.set_xlabel("step")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel(f"evaluations (mean {history['evaluations'].mean():.2f})", color="tab:blue")
     residual = axes.twinx()
     residual.semilogy(history["step"], np.maximum(history["residual"], 1e-16), ".", color="tab:red", markersize=3)
@@ -105,7 +108,7 @@ def plot_maps(folder, out, number=None):
     figure, axes = plt.subplots(1, len(names), figsize=(3.2 * len(names), 6), squeeze=False)
     for one, name in zip(axes[0], names):
         draw_map(one, mesh, step, name)
-    figure.suptitle(f"step {step.number}, load factor {step.load_factor:.4g}")
+    figure.suptitle(f"step {step.number}, load factor {step.load_factor:.4g}", y=0.9)
     return [save(figure, out / f"maps_{step.number:06d}.png")]
 
 
