@@ -1,12 +1,16 @@
 """The contact laws of a prepared volume element, by constant stiffnesses kn, kt [N/m] over a polydisperse packing.
 
+delta is the overlap, forces are compression positive; mu is the friction, f_c the adhesion [N].
+
 "adhesive"  f_n = kn delta - f_c while the contact exists, |f_t| <= mu kn delta; sliding leaves the adhesion alone
-            (Gilabert, Roux, Castellanos 2007; the law of Nguyen et al. 2017). In tension YADE holds f_n = -f_c from
-            delta = 0 to delta = -f_c/kn, then the contact is lost for good.
-"bonded"    the same until the contact first slides or opens: then its adhesion is gone (YADE's `fragile`).
+            (Gilabert, Roux, Castellanos 2007; the law of Nguyen et al. 2017). Two deviations of YADE 2023.02a's
+            CohFrict: in tension it holds f_n = -f_c from delta = 0 to delta = -f_c/kn before the contact is lost for
+            good; and a contact that slides while its net force is attractive passes no normal force in that step.
+"bonded"    f_n = kn delta down to -f_c, |f_t| <= mu (f_n + f_c), until it first slides or opens: then the bond is gone
+            and the contact is one of friction.
 "friction"  f_n = kn delta, |f_t| <= mu f_n: cheaper, no adhesion.
 
-Forces are compression positive, delta is the overlap.
+Contacts that form later have no adhesion, in all three.
 """
 
 import math
@@ -60,15 +64,15 @@ def set_friction(bodies, interactions, friction):
         i.phys.tangensOfFrictionAngle = friction
 
 
-def add_adhesion(interactions, f_c, friction, fragile):
+def add_adhesion(law, interactions, f_c, friction):
     """Gives every contact without adhesion the force f_c [N]; returns how many there were."""
     count = 0
     for i in interactions:
         p = i.phys
         if p.normalAdhesion > 0:
             continue
-        p.unp, p.unpMax = f_c / p.kn, 0.0
+        p.unp, p.unpMax = (f_c / p.kn if law == "adhesive" else 0.0), 0.0
         p.normalAdhesion, p.shearAdhesion = f_c, friction * f_c
-        p.cohesionBroken, p.fragile = False, fragile
+        p.cohesionBroken, p.fragile = False, law == "bonded"
         count += 1
     return count
