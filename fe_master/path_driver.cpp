@@ -26,8 +26,9 @@ Tensor2 exponential(const Tensor2& E) {
   return eigen.eigenvectors() * stretches.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-double stress_scale(const Tensor2& stress) {
-  const double scale = stress.norm() / std::sqrt(3.0);
+/// Mean stress of the isotropic state of the same norm, the larger of two states; 1 where both are free of stress.
+double stress_scale(const Tensor2& one, const Tensor2& other) {
+  const double scale = std::max(one.norm(), other.norm()) / std::sqrt(3.0);
   return scale > 0 ? scale : 1;
 }
 
@@ -68,10 +69,10 @@ void PathDriver::begin_segment(const PathSegment& segment) {
   point_.begin_step();
   response_ = point_.evaluate(std::array{F_}, Operator::elastic).front();
   if (response_.failure) throw UserError(response_.failure->sentence + " " + response_.failure->advice);
-  tangent_.emplace(response_.stiffness, kAllComponents,
+  R_ = polar_decomposition(F_).R;
+  tangent_.emplace(rotate(response_.stiffness, R_.transpose()), kAllComponents,
                    LearningLimits{parameters_.qn_min, parameters_.qn_max, parameters_.qn_skew, parameters_.qn_noise});
   segment_ = segment;
-  R_ = polar_decomposition(F_).R;
   F_start_ = F_;
   E_start_ = path_strain(F_);
   stress_start_ = path_components(response_.stress);
@@ -167,7 +168,8 @@ PathStep PathDriver::solve(double fraction) {
     PathIteration& now = step.table.emplace_back();
     if (!evaluate(by_gradient ? prescribed_deformation(fraction) : deformation(E), step)) return step;
     const PathVector missing = target - path_components(trial_.stress);
-    for (const int c : free) now.residual = std::max(now.residual, std::abs(missing[c]) / stress_scale(trial_.stress));
+    const double scale = stress_scale(trial_.stress, from_path_components(stress_start_));
+    for (const int c : free) now.residual = std::max(now.residual, std::abs(missing[c]) / scale);
     if (!std::isfinite(now.residual) || now.residual > kDivergence * least) {
       step.reason = fmt::format("diverged: residual {:.1e} after {:.1e}", now.residual, least);
       return step;

@@ -30,7 +30,8 @@ struct PathIteration {
   double dem_steps = 0;
 };
 
-/// How a step of a path went. Residuals are relative to |sigma| / sqrt(3), the mean stress of an isotropic state.
+/// How a step of a path went. Residuals are relative to |sigma| / sqrt(3), the mean stress of an
+/// isotropic state, of the trial or of the segment's start, whichever is larger.
 struct PathStep {
   bool converged = false;
   std::vector<PathIteration> table;

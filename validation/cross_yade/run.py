@@ -8,6 +8,7 @@ Writes FOLDER/table.csv, table.md and cross_yade.png; curves that are there alre
 
 import argparse
 import csv
+import functools
 import json
 import re
 import subprocess
@@ -61,8 +62,10 @@ def case_file(folder, law, seed, path, spheres):
     return file
 
 
-def packing(program, case):
-    """State file of a case's volume element and its manifest, prepared where the cache does not have it."""
+@functools.cache
+def packing(program, folder, law, seed, spheres):
+    """State file of a volume element and its manifest, prepared where the cache does not have it."""
+    case = case_file(folder, law, seed, PATHS["biaxial"], spheres)
     text = subprocess.run([program, "ve", "prepare", case], check=True, capture_output=True, text=True).stdout
     state = Path(re.search(r"(\S+\.state)", text)[1])
     return state, json.loads(state.with_suffix(".json").read_text())
@@ -78,7 +81,7 @@ def compute(program, folder, law, seed, path, spheres):
     missing = [name for name in SERIES[1:] if not yade_curve(folder, case, name).exists()]
     if not missing:
         return case
-    state, manifest = packing(program, case)
+    state, manifest = packing(program, folder, law, seed, spheres)
     for name in missing:
         rate = INERTIAL_NUMBER / manifest["time_scale"] / (2 if name == "yade_half_rate" else 1)
         curve = yade_curve(folder, case, name)
