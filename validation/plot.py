@@ -69,7 +69,7 @@ def draw_curves(axes, curves):
     for curve, style in zip(curves, ("-o", "--", "-s", "-^", "-v")):
         axes.plot(100 * curve.strain, curve.stress, style, markersize=3, linewidth=1, label=curve.label)
     axes.set_xlabel("axial strain [%] (nominal, compression positive)")
-    axes.set_ylabel(r"axial stress / $\sigma_0$ (compression positive)")
+    axes.set_ylabel(f"axial stress {curves[0].unit} (compression positive)")
     axes.grid(alpha=0.3)
     axes.legend()
 

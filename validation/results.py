@@ -133,7 +133,8 @@ def deformed_points(mesh, step):
 
 
 def confining_stress(case):
-    """sigma_0 [Pa], compression positive: of the lateral pressure, else of the volume element, else of the law."""
+    """sigma_0 [Pa], compression positive: of the lateral pressure, else of the volume element, else of the law; 0 without
+    confinement."""
     pressures = [load["value"] for load in case.get("load", []) if load.get("kind") == "pressure"]
     if pressures:
         return pressures[0]
@@ -145,8 +146,14 @@ def confining_stress(case):
 @dataclass
 class Curve:
     strain: np.ndarray  #: axial, nominal (shortening over initial height), compression positive
-    stress: np.ndarray  #: axial over sigma_0, compression positive
+    stress: np.ndarray  #: axial over sigma_0, or in Pa without confinement, compression positive
     label: str
+    unit: str = r"/ $\sigma_0$"  #: of the stress, as on an axis
+
+
+def _curve(strain, stress, case, label):
+    sigma_0 = confining_stress(case)
+    return Curve(strain, stress / sigma_0, label) if sigma_0 else Curve(strain, stress, label, "[Pa]")
 
 
 def _monitor(case, quantity, edge, folder):
@@ -168,7 +175,7 @@ def axial_curve(folder, edge="top", label=None, nominal=False):
     shortening = -history[_monitor(case, "displacement_y", edge, folder)]
     if not nominal and any(m["quantity"] == "length" and m.get("edge") == edge for m in case["monitor"]):
         width = history[_monitor(case, "length", edge, folder)]
-    return Curve(shortening / height, -reaction / width / confining_stress(case), label or str(folder))
+    return _curve(shortening / height, -reaction / width, case, label or str(folder))
 
 
 def path_curve(folder, component="yy", label="single volume element"):
@@ -178,4 +185,4 @@ def path_curve(folder, component="yy", label="single volume element"):
     if missing:
         raise ResultsError(f"{folder}/history.csv: no column {missing[0]}; give the folder of `femxdem ve path`")
     strain = 1 - np.exp(history[f"strain_{component}"])
-    return Curve(strain, -history[f"stress_{component}"] / confining_stress(case), label)
+    return _curve(strain, -history[f"stress_{component}"], case, label)

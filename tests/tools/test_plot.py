@@ -42,6 +42,13 @@ class Files(unittest.TestCase):
         np.testing.assert_allclose(axial_curve(self.folder).stress, [1.0, 1.0], rtol=1e-14)
         np.testing.assert_allclose(axial_curve(self.folder, nominal=True).stress, [1.0, 3.0], rtol=1e-14)
 
+    def test_curve_without_confinement_is_in_pascals(self):
+        case = self.folder / "case.toml"
+        case.write_text(case.read_text().replace("value = 2e5", "value = 0.0"))
+        curve = axial_curve(self.folder)
+        self.assertEqual(curve.unit, "[Pa]")
+        np.testing.assert_allclose(curve.stress, [2e5, 6e5], rtol=1e-14)
+
     def test_a_missing_monitor_is_named(self):
         with self.assertRaisesRegex(ResultsError, 'quantity = "reaction_y" on edge "bottom"; add it'):
             axial_curve(self.folder, edge="bottom")
