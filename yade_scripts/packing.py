@@ -26,6 +26,7 @@ COMPACTION_DAMPING = 0.3
 STRESS_TOLERANCE = 5e-4  # of sigma_0, each component
 UNBALANCED_TOLERANCE = 5e-5
 ROUGH = 40  # times both tolerances, for a stage that another one follows
+ROUGH_STEPS = 10_000  # and no longer than this at kappa = 500: without friction the last rearrangements take very long
 MAX_STEPS = 400_000
 
 
@@ -47,7 +48,7 @@ def prepare(O, spec):
     O.dt = 0.2 * math.sqrt(O.bodies[int(np.argmin(radii))].state.mass / kn)
     servo = _Servo(O, p, kn)
     servo.compact()
-    servo.settle(ROUGH)
+    servo.settle(ROUGH, servo.steps + int(ROUGH_STEPS * math.sqrt(p["kappa"] / 500)))
     contact_laws.set_friction(O.bodies, O.interactions, p["friction"])
     if f_c > 0:
         _set_radii(O, radii, kn, p["density"])
@@ -145,9 +146,10 @@ class _Servo:
         while np.trace(self.error()) > 3 * 0.9:
             self._strain(-self.rate * np.eye(3))
 
-    def settle(self, slack=1):
-        """Until the stress is on target and the spheres are at rest, within `slack` times the tolerances."""
-        while True:
+    def settle(self, slack=1, last_step=MAX_STEPS + 1):
+        """Until the stress is on target and the spheres are at rest, within `slack` times the tolerances, or until
+        step `last_step`."""
+        while self.steps < last_step:
             e = self.error()
             if np.abs(e).max() < slack * STRESS_TOLERANCE:
                 if self.unbalanced() < slack * UNBALANCED_TOLERANCE:

@@ -65,6 +65,7 @@ class Engine:
         self._to_forces()
         grains = _grains(self.O)
         manifest.update(self._geometry(grains), **self._state_of_contacts(grains))
+        manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")

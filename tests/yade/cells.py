@@ -1,0 +1,55 @@
+"""What the tests of YADE share: one engine, its small volume elements, and plain arrays of what it measures."""
+
+from functools import cache
+
+import numpy as np
+
+from volume_element import Engine
+
+FIELDS = (
+    "dem_steps seconds engine_seconds unbalanced_force inertial_number time_step porosity coordination "
+    "coordination_backbone fabric_xx fabric_yy fabric_zz fabric_xy fabric_yz fabric_zx mean_rotation "
+    "adhesive_contacts stress_asymmetry sliding_contacts contacts"
+).split()
+SPHERES = 60
+FRICTION = {"spheres": SPHERES, "contact_law": "friction"}
+ADHESIVE = {"spheres": SPHERES, "cohesion": 1.0}
+
+
+@cache
+def engine():
+    return Engine(FIELDS)
+
+
+@cache
+def _template(items):
+    return engine().make_template(dict(items))
+
+
+def template(spec):
+    """Prepared once a process and specification."""
+    return _template(tuple(sorted(spec.items())))
+
+
+def element(spec):
+    """Number of a new volume element of that specification."""
+    return engine().add(template(spec)["state"])
+
+
+def measure(ve):
+    """Stress (3, 3), report as a dict, deformation gradient (3, 3)."""
+    stress, report, stretch = np.full(9, np.nan), np.full(len(FIELDS), np.nan), np.full(9, np.nan)
+    engine().measure(ve, stress, report, stretch)
+    return stress.reshape(3, 3), dict(zip(FIELDS, report)), stretch.reshape(3, 3)
+
+
+def select(ve):
+    """YADE's scene of that volume element."""
+    engine().info(ve)
+    return engine().O
+
+
+def rate(ve, inertial_number, direction):
+    """Velocity gradient [1/s] of that inertial number along `direction` (3, 3)."""
+    d = np.asarray(direction, dtype=float)
+    return inertial_number / engine().info(ve)["time_scale"] * d / np.linalg.norm(0.5 * (d + d.T))

@@ -1,0 +1,87 @@
+"""Packings from dimensionless groups: on target, at rest, reproducible, with the stiffnesses and adhesion asked for."""
+
+import unittest
+
+import numpy as np
+
+import contact_loop
+import packing
+from cells import ADHESIVE, FRICTION, element, engine, measure, select, template
+
+BONDED = {**ADHESIVE, "contact_law": "bonded"}
+SOFT = {"spheres": 60, "kappa": 100.0, "stiffness_ratio": 2.0, "size_ratio": 3.0, "cohesion": 2.0, "confining_stress": 2e5}
+
+
+class Equilibrium(unittest.TestCase):
+    def test_isotropic_stress_within_a_thousandth_and_at_rest(self):
+        for spec in (FRICTION, ADHESIVE, BONDED, SOFT):
+            with self.subTest(spec):
+                sigma = spec.get("confining_stress", 1e5)
+                stress, report, F = measure(element(spec))
+                np.testing.assert_allclose(stress, -sigma * np.eye(3), rtol=0, atol=1e-3 * sigma)
+                self.assertLess(report["unbalanced_force"], 1e-4)
+                np.testing.assert_array_equal(F, np.eye(3))
+
+    def test_equal_seeds_equal_bits_other_seeds_other_packings(self):
+        first = engine().make_template({**FRICTION, "seed": 7})["manifest"]
+        again = engine().make_template({**FRICTION, "seed": 7})["manifest"]
+        other = engine().make_template({**FRICTION, "seed": 8})["manifest"]
+        for key in ("porosity", "stress", "fabric", "unbalanced_force", "time_step"):
+            self.assertEqual(first[key], again[key])
+        self.assertNotEqual(first["fabric"], other["fabric"])
+
+    def test_friction_during_compaction_makes_it_looser(self):
+        loose = template({**FRICTION, "compaction_friction": 0.5})["manifest"]
+        self.assertGreater(loose["porosity"], template(FRICTION)["manifest"]["porosity"] + 0.02)
+
+
+class Contacts(unittest.TestCase):
+    def test_sizes(self):
+        O = select(element(SOFT))
+        d = np.array([2 * b.shape.radius for b in O.bodies])
+        self.assertAlmostEqual(d.mean(), 1e-3, delta=1e-15)
+        self.assertLess(d.max() / d.min(), 3.0)
+        self.assertGreater(d.max() / d.min(), 2.5)
+
+    def test_stiffnesses_and_adhesion_are_equal_over_a_polydisperse_packing(self):
+        kn, f_c = 100 * 2e5 * 1e-3, 2 * 2e5 * 1e-6
+        c = contact_loop.contacts(select(element(SOFT)))
+        for name, value in {
+            "kn": kn,
+            "ks": kn / 2,
+            "normalAdhesion": f_c,
+            "shearAdhesion": 0.5 * f_c,
+            "unp": f_c / kn,
+            "tangensOfFrictionAngle": 0.5,
+        }.items():
+            np.testing.assert_allclose(contact_loop.values(c, name), value, rtol=1e-12, err_msg=name)
+        self.assertFalse(contact_loop.values(c, "fragile").any())
+        self.assertTrue((contact_loop.values(c, "unpMax") == 0).all())
+
+    def test_every_contact_of_the_adhesive_packing_overlaps_and_sticks(self):
+        O = select(element(ADHESIVE))
+        c = contact_loop.contacts(O)
+        radius = np.array([b.shape.radius for b in O.bodies])
+        self.assertTrue((radius[c.ids].sum(axis=1) > c.length).all())
+        self.assertTrue(contact_loop.adhesive(c).all())
+
+    def test_bonds_leave_the_forces_alone(self):
+        c = contact_loop.contacts(select(element(BONDED)))
+        self.assertTrue((contact_loop.values(c, "unp") == 0).all())
+        self.assertTrue(contact_loop.values(c, "fragile").all())
+
+
+class Refusals(unittest.TestCase):
+    def test_senseless_values(self):
+        for wrong, sentence in (
+            ({"contact_law": "glue"}, 've.contact_law = "glue" is unknown'),
+            ({"contact_law": "friction", "cohesion": 1.0}, "ve.cohesion > 0 needs"),
+            ({"spheres": 3}, "spheres >= 20"),
+            ({"kappa": -1.0}, "kappa > 0"),
+        ):
+            with self.subTest(wrong), self.assertRaisesRegex(ValueError, sentence):
+                packing.prepare(None, wrong)
+
+
+if __name__ == "__main__":
+    unittest.main()
