@@ -43,22 +43,22 @@ Loads::Loads(const Element& element, double end_time) : element_(element), end_t
 
 Loads::Loads(const Case& c, const Element& element) : Loads(element, c.control.end_time) {
   body_force = c.body_force;
-  for (const Load& load : c.loads) add(load, element);
+  for (const Load& load : c.loads) add(load);
 }
 
-void Loads::add(const Load& load, const Element& element) {
+void Loads::add(const Load& load) {
   if (load.kind == LoadKind::traction || load.kind == LoadKind::pressure) {
     forces_.push_back(load);
     return;
   }
-  const Mesh& mesh = element.mesh();
+  const Mesh& mesh = element_.mesh();
   const std::vector<int> nodes = load.point.empty()
                                      ? edge_nodes(mesh, load.edge)
                                      : std::vector<int>{nearest_node(mesh, Point2(load.point[0], load.point[1]))};
   const auto value = [load, end_time = end_time_](double t) { return load.value * load_factor(load, t, end_time); };
   for (const int node : nodes) {
     const int i = component_index(load.component);
-    const int dof = load.kind == LoadKind::gradient ? element.gradient_dof(node, i) : 2 * node + i;
+    const int dof = load.kind == LoadKind::gradient ? element_.gradient_dof(node, i) : 2 * node + i;
     if (dof >= 0) prescribe(dof, value);
   }
 }

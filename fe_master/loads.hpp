@@ -12,11 +12,13 @@ namespace femxdem {
 /// Boundary conditions and external forces of a mesh.
 class Loads {
  public:
-  /// Loads of a case on the elements' mesh. A later displacement of the same unknown replaces an earlier one.
+  /// Loads of a case on the elements' mesh.
   Loads(const Case& c, const Element& element);
   /// No loads yet: constraints are added by hand (tests, closed forms). end_time [s].
   explicit Loads(const Element& element, double end_time = 1);
 
+  /// Adds a load of a case. A later displacement of the same unknown replaces an earlier one.
+  void add(const Load& load);
   /// Prescribes unknown `dof` as a function of time [s]; for micro-gradient unknowns the accumulated value.
   void prescribe(int dof, std::function<double(double)> value);
   /// Prescribed unknowns, ascending.
@@ -31,7 +33,6 @@ class Loads {
   BodyForce body_force;
 
  private:
-  void add(const Load& load, const Element& element);
   void add_edge_force(const Load& load, const Eigen::VectorXd& x, double factor, Eigen::VectorXd& f) const;
 
   struct Prescribed {
