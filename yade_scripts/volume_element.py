@@ -50,7 +50,7 @@ class Engine:
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
         self.report_fields = list(report_fields)
-        self._free, self._trial, self._grains = [], {}, {}
+        self._free, self._trial, self._grains = [], {}, {}  # scene 0 is where templates are made
 
     def versions(self):
         return yade_modules.versions()
@@ -73,7 +73,8 @@ class Engine:
 
     def _make_scene(self, spec):
         """Fills the current scene as the case says; sentences on what was special."""
-        self.O.reset()
+        self._select(0)
+        self.O.resetThisScene()
         if spec["source"] == "prepare":
             packing.prepare(self.O, spec)
             return []
@@ -106,7 +107,7 @@ class Engine:
 
     def remove(self, ve):
         self._select(ve)
-        self.O.resetCurrentScene()
+        self.O.resetThisScene()
         self._free.append(ve)
         del self._trial[ve], self._grains[ve]
 
