@@ -1,0 +1,68 @@
+#include "convergence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace femxdem {
+namespace {
+
+constexpr double kDivergence = 1e3;  // growth over the first residual and over the tolerance
+constexpr double kSame = 1e-9;       // relative difference of residuals that repeat themselves
+constexpr std::size_t kLongestCycle = 4;
+constexpr std::size_t kWindow = 6;  // last residuals that are looked at for a verdict
+constexpr double kProgress = 0.7;   // a least residual above this times the earlier one is no progress
+
+bool same(double a, double b) { return std::abs(a - b) <= kSame * std::max(a, b); }
+
+/// Length of the cycle at the end of the residuals, seen twice over; 0: none.
+std::size_t cycle(const std::vector<double>& r) {
+  for (std::size_t length = 2; length <= kLongestCycle && 2 * length + 1 <= r.size(); ++length) {
+    const auto end = r.end();
+    const auto n = static_cast<std::ptrdiff_t>(length);
+    if (std::equal(end - n, end, end - 2 * n, same) && same(*(end - 2 * n - 1), *(end - n - 1))) return length;
+  }
+  return 0;
+}
+
+}  // namespace
+
+double ResidualHistory::least() const {
+  return residuals_.empty() ? std::numeric_limits<double>::infinity()
+                            : *std::min_element(residuals_.begin(), residuals_.end());
+}
+
+std::string ResidualHistory::hopeless(bool memoryless) const {
+  const double last = residuals_.back();
+  if (!std::isfinite(last)) return "diverges: the residual is not finite";
+  if (last > kDivergence * std::max(residuals_.front(), tolerance_)) {
+    return fmt::format("diverges: residual {:.1e} after {:.1e}", last, least());
+  }
+  if (const std::size_t length = memoryless ? cycle(residuals_) : 0; length > 0) {
+    return fmt::format("oscillates: a cycle of {} iterations at residuals from {:.1e}", length,
+                       *std::min_element(residuals_.end() - static_cast<std::ptrdiff_t>(length), residuals_.end()));
+  }
+  return "";
+}
+
+std::string ResidualHistory::verdict() const {
+  const std::string spent =
+      fmt::format("in {} iterations: least residual {:.1e}, tolerance {:.1e}", residuals_.size(), least(), tolerance_);
+  const std::size_t window = std::min(kWindow, residuals_.size() - 1);
+  const auto recent = residuals_.end() - static_cast<std::ptrdiff_t>(window);
+  if (window < 3) return "does not converge " + spent;
+  const double earlier = *std::min_element(residuals_.begin(), recent);
+  const double now = *std::min_element(recent, residuals_.end());
+  int turns = 0;
+  for (auto r = recent + 1; r + 1 != residuals_.end(); ++r) turns += (r[0] > r[-1]) != (r[1] > r[0]);
+  const bool progress = now <= kProgress * earlier;
+  const double largest = *std::max_element(recent, residuals_.end());
+  if (!progress && turns >= static_cast<int>(window) / 2 && largest > 2 * now) return "oscillates " + spent;
+  if (residuals_.back() > 10 * least()) return "diverges " + spent;
+  if (progress) return "converges too slowly " + spent;
+  return "stagnates " + spent;
+}
+
+}  // namespace femxdem
