@@ -28,11 +28,14 @@ std::string read_file(const fs::path& file) {
   return text.str();
 }
 
-/// What the prepared state depends on besides the specification: the files that it names.
+/// What the prepared state depends on: the specification, the files that it names, the versions and scripts that make it.
 std::string key_of(const VeParameters& ve, const std::string& specification, const std::string& versions) {
   std::string key = specification + versions;
   for (const std::string& file : {ve.script, ve.scene}) {
     if (!file.empty()) key += read_file(file);
+  }
+  for (const char* maker : {"packing.py", "contact_laws.py", "adoption.py", "time_step.py"}) {
+    key += read_file(fs::path(FEMXDEM_YADE_SCRIPTS) / maker);
   }
   return hash(key);
 }
