@@ -1,13 +1,18 @@
 #include <fmt/format.h>
 #include <mpi.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
 
 #include "python_volume_elements.hpp"
 #include "ve_templates.hpp"
 
-/// What the bridge costs beside the DEM engine, on volume elements as they are used. Two tables:
+/// What the bridge costs beside the DEM engine, on volume elements as they are used:
 ///
 ///     bridge_benchmark snapshot --spheres 1000                  fork against serialise, a VE and trial
 ///     mpirun -np 2 bridge_benchmark overhead --spheres 1000     engine seconds over ranks x wall time of evaluate
@@ -21,10 +26,6 @@ struct Settings {
   int repetitions = 3;
   std::string cache = "packings";
 };
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::string packing(PythonVolumeElements& elements, const Settings& settings) {
   VeParameters ve;
@@ -48,28 +49,51 @@ std::vector<Tensor2> gradients(std::size_t points, int trial) {
   return std::vector<Tensor2>(points, F);
 }
 
-struct Cost {
-  double wall = 0;    ///< of a trial and volume element [s]
-  double inside = 0;  ///< of which in deform and measure [s]
-};
-
-/// Mean over the trials, each followed by a rejection or by a commit.
-Cost trials(PythonVolumeElements& elements, const Settings& settings, bool commit) {
-  Cost cost;
-  elements.evaluate(gradients(elements.size(), 0), Operator::none);
-  const auto start = std::chrono::steady_clock::now();
-  for (int trial = 1; trial <= settings.repetitions; ++trial) {
-    for (const Response& r : elements.evaluate(gradients(elements.size(), trial), Operator::none)) {
-      if (r.failure) throw std::runtime_error(r.failure->sentence);
-      cost.inside += r.report["seconds"];
-    }
-    if (commit) elements.commit();
-  }
-  elements.versions();  // waits until the last trial is gone
-  const double trials = static_cast<double>(elements.size()) * settings.repetitions;
-  return {seconds_since(start) / trials, cost.inside / trials};
+/// Processor time of a worker and of all that it has forked so far [s].
+double processor_seconds(const WorkerProcess& worker) {
+  std::ifstream file(fmt::format("/proc/{}/stat", worker.pid()));
+  std::string line;
+  std::getline(file, line);
+  std::istringstream fields(line.substr(line.rfind(')') + 2));
+  std::string skipped;
+  for (int k = 3; k < 14; ++k) fields >> skipped;
+  double ticks = 0;  // utime, stime, cutime, cstime of proc(5)
+  double value = 0;
+  for (int k = 14; k < 18 && fields >> value; ++k) ticks += value;
+  rusage reaped{};
+  getrusage(RUSAGE_CHILDREN, &reaped);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return ticks / static_cast<double>(sysconf(_SC_CLK_TCK)) + seconds(reaped.ru_utime) + seconds(reaped.ru_stime);
 }
 
+/// Waits until the last trial and the last former committed process are gone and counted.
+void settle(PythonVolumeElements& elements) {
+  elements.versions();
+  usleep(300'000);
+  elements.versions();
+}
+
+enum class After { nothing, rejection, commit };
+
+/// Processor time of one trial per volume element [ms]; with After::nothing the volume elements are not asked to move.
+double cost(WorkerProcess& worker, PythonVolumeElements& elements, int trial, After after) {
+  const auto nowhere = std::vector<Tensor2>(elements.size(), Tensor2::Constant(std::nan("")));
+  elements.begin_step();
+  const double before = processor_seconds(worker);
+  elements.evaluate(after == After::nothing ? nowhere : gradients(elements.size(), trial), Operator::none);
+  if (after == After::commit) elements.commit();
+  settle(elements);
+  return 1e3 * (processor_seconds(worker) - before) / static_cast<double>(elements.size());
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// Serialised and forked trials take turns, so that both see the same load of the machine.
 void print_snapshot_costs(WorkerProcess& worker, const Settings& settings) {
   PythonVolumeElements forked(worker, options(settings));
   WorkerProcess other({});
@@ -77,16 +101,21 @@ void print_snapshot_costs(WorkerProcess& worker, const Settings& settings) {
   const std::string state = packing(forked, settings);
   forked.add(state, settings.points);
   saved.add(state, settings.points);
-  fmt::print("{} volume elements of {} spheres, {} steps a trial; ms a volume element and trial\n", settings.points,
-             settings.spheres, settings.steps);
-  fmt::print("{:<22}{:>12}{:>12}{:>12}{:>12}\n", "trial is", "wall, fork", "wall, saved", "fork costs", "saving costs");
-  for (const bool commit : {false, true}) {
-    const Cost by_saving = trials(saved, settings, commit);
-    const Cost by_fork = trials(forked, settings, commit);
-    // what the trial itself costs is what it costs where no pages are copied
-    const double fork_cost = by_fork.wall - by_saving.inside, saving_cost = by_saving.wall - by_saving.inside;
-    fmt::print("{:<22}{:>12.2f}{:>12.2f}{:>12.2f}{:>12.2f}   ratio {:.1f}\n", commit ? "committed" : "rejected",
-               1e3 * by_fork.wall, 1e3 * by_saving.wall, 1e3 * fork_cost, 1e3 * saving_cost, saving_cost / fork_cost);
+  fmt::print("{} volume elements of {} spheres, {} steps a trial; processor time [ms] of a volume element and trial\n",
+             settings.points, settings.spheres, settings.steps);
+  for (const After after : {After::rejection, After::commit}) {
+    std::vector<double> trials, forking, saving;
+    for (int trial = 0; trial < settings.repetitions; ++trial) {
+      cost(other, saved, trial, After::rejection);  // its snapshot is there from now on
+      const double restoring = cost(other, saved, trial, After::nothing);
+      trials.push_back(cost(other, saved, trial, After::rejection) - restoring);
+      forking.push_back(cost(worker, forked, trial, after) - trials.back());
+      if (after == After::commit) cost(other, saved, trial, after);  // the next one takes a new snapshot
+      saving.push_back(after == After::commit ? cost(other, saved, trial, after) - trials.back() : restoring);
+    }
+    fmt::print("{:<10} alone {:.2f}, by forking {:+.2f}, by serialising {:+.2f}: ratio {:.1f}\n",
+               after == After::commit ? "committed" : "rejected", median(trials), median(forking), median(saving),
+               median(saving) / median(forking));
   }
 }
 

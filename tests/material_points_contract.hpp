@@ -14,9 +14,11 @@
 namespace femxdem::contract {
 
 struct Tolerances {
-  double strain = 1e-3;     ///< size of the trials [-]
-  double path = 1e-12;      ///< one path in two steps against one step, relative to the stress
-  double rotation = 1e-12;  ///< rotated against unrotated, relative to the stress
+  double strain = 1e-3;  ///< size of the trials [-]
+  double path = 1e-12;   ///< one path in two steps against one step, relative to the stress
+  /// Rotated against unrotated, relative to the stress: a stress of E times the strain inherits E times the round-off
+  /// of F and of its polar decomposition, some 20 eps.
+  double rotation = 20 * std::numeric_limits<double>::epsilon() / strain;
 };
 
 inline bool same_bits(const Tensor2& a, const Tensor2& b) { return std::memcmp(a.data(), b.data(), sizeof a) == 0; }

@@ -64,6 +64,22 @@ TEST(PythonVolumeElements, ForkAndSerialisingGiveTheSameBits) {
   }
 }
 
+TEST(PythonVolumeElements, WhereForkIsRefusedItSerialisesAndSaysSoOnce) {
+  Points forked({kPlain, kPlain, kPlain});
+  std::vector<std::string> said;
+  VolumeElementOptions options;
+  options.say = [&](std::string_view line) { said.emplace_back(line); };
+  WorkerProcess worker(dummy("slow_engine:UnforkableEngine"));
+  PythonVolumeElements unforkable(worker, options);
+  EXPECT_THROW(unforkable.make_template(kPlain), UserError);
+  unforkable.add(forked.points.save()[0], 3);
+  contract::check(unforkable, {});
+  const auto F = gradients(3, 1e-3);
+  expect_same_bits(contract::trial(unforkable, F), contract::trial(forked.points, F));
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_NE(said[0].find("fork was refused"), std::string::npos) << said[0];
+}
+
 TEST(PythonVolumeElements, ElasticStressOfTheDummyCell) {
   // sigma = R (C : (U - I) - p I) R^T with E = 1e8, nu = 0.25, p = 1e5: lambda = mu = 4e7
   Points one({kPlain});

@@ -1,6 +1,8 @@
-"""A dummy volume element that takes its time, and one whose constructor fails: for tests of the worker."""
+"""Dummy volume elements that take their time, cannot fork, or do not start: for tests of the worker."""
 
+import os
 import pathlib
+import resource
 import sys
 import time
 
@@ -28,6 +30,16 @@ class TemplateEngine(protocol.DummyEngine):
         if spec.get("script") == "mistake":
             raise ValueError("script theirs.py, line 3: no periodic cell; set O.periodic = True.")
         return super().make_template(spec)
+
+
+class UnforkableEngine(protocol.DummyEngine):
+    """In a process that may start no other (limits do not bind root)."""
+
+    def __init__(self, report_fields):
+        super().__init__(report_fields)
+        if os.getuid() == 0:
+            os.setuid(65534)
+        resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
 
 
 class BrokenEngine:
