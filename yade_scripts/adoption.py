@@ -83,6 +83,7 @@ def _refuse_unsuitable(O, names):
 
 def _reset(O, integrator):
     """Puts the scene at rest in its reference state; sentences on what had to be changed."""
+    from yade._utils import calm
     from yade.utils import Matrix3, Vector3
 
     done = []
@@ -94,6 +95,8 @@ def _reset(O, integrator):
         O.cell.velGrad = Matrix3.Zero
     O.dt = 0.0
     O.step()  # YADE applies a new velocity gradient in the integrator: one step that takes no time
+    done.append("velocities of the grains set to zero")
+    calm()
     if O.cell.trsf != Matrix3.Identity:
         done.append("deformation gradient of the cell set to the identity")
         O.cell.trsf = Matrix3.Identity

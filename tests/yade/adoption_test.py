@@ -1,0 +1,170 @@
+"""Users' scenes and scripts as volume elements, and the true reason where one cannot serve."""
+
+import os
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import adoption
+from cells import FRICTION, element, engine, measure, rate, select
+
+EXAMPLES = Path("/usr/share/doc/yade/examples")
+SCRIPT = """
+import sys
+from yade import pack, plot, qt
+O.periodic = True
+O.cell.hSize = Matrix3(0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1)
+cloud = pack.SpherePack()
+cloud.makeCloud((0, 0, 0), (0.1, 0.1, 0.1), rMean=0.01, rRelFuzz=0.1, num=int(sys.argv[1]), periodic=True, seed=3)
+cloud.toSimulation(material=FrictMat(young=1e7, poisson=0.3, frictionAngle=radians(20)))
+O.engines = [
+    ForceResetter(),
+    InsertionSortCollider([Bo1_Sphere_Aabb()]),
+    InteractionLoop(
+        [Ig2_Sphere_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FrictPhys()], [Law2_ScGeom_FrictPhys_CundallStrack()]
+    ),
+    PeriTriaxController(label='triax', goal=(-1e4, -1e4, -1e4), stressMask=7, maxUnbalanced=.05, relStressTol=.05,
+                        maxStrainRate=(1, 1, 1), globUpdate=5, doneHook='finished()'),
+    NewtonIntegrator(damping=.4),
+    PyRunner(command='remember()', iterPeriod=50),
+]
+O.dt = 0.5 * PWaveTimeStep()
+qt.View()
+seen = []
+def remember():
+    seen.append(O.iter)
+def finished():
+    O.pause()
+"""
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def script(self, end="O.run()\nO.wait()", spheres="60"):
+        path = self.folder / "theirs.py"
+        path.write_text(SCRIPT + end + "\n")
+        return {"source": "script", "script": str(path), "arguments": [spheres], "script_seconds": 120.0}
+
+
+class Script(Folder):
+    def test_runs_unchanged_and_is_adopted_at_rest_in_its_reference_state(self):
+        made = engine().make_template(self.script())
+        m = made["manifest"]
+        self.assertEqual(m["spheres"], 60)
+        self.assertEqual(m["dropped"], ["PeriTriaxController (triax)", "PyRunner"])
+        self.assertEqual(m["kept"], list(adoption.KEPT))
+        self.assertEqual(len(m["reset"]), 3)
+        ve = engine().add(made["state"])
+        stress, _, F = measure(ve)
+        np.testing.assert_allclose(np.diag(stress), -1e4, rtol=0.1)
+        np.testing.assert_array_equal(F, np.eye(3))
+        L = rate(ve, 1e-3, np.diag([0.0, -1.0, 0.0]))
+        engine().deform(ve, L, 50)
+        end = np.linalg.matrix_power(np.eye(3) + L * m["time_step"], 50)
+        np.testing.assert_allclose(measure(ve)[2], end, rtol=0, atol=1e-14)
+
+    def test_a_script_that_never_ends_is_stopped_and_says_so(self):
+        spec = {**self.script("triax.maxUnbalanced = 0\nwhile True:\n    O.run(500, True)"), "script_seconds": 3.0}
+        self.assertIn("stopped after 3 s", " ".join(engine().make_template(spec)["manifest"]["notes"]))
+
+    def test_a_script_that_does_not_start_its_simulation_is_run_until_its_hooks_pause_it(self):
+        manifest = engine().make_template(self.script(end=""))["manifest"]
+        self.assertIn("did not start its simulation", manifest["notes"][0])
+        self.assertGreater(manifest["contacts"], 60)
+
+    def test_refusals(self):
+        for extra, reason in (
+            ("O.engines = O.engines + [TranslationEngine(ids=[0])]", "engine TranslationEngine, which acts on the grains"),
+            ("O.engines = O.engines[:4] + O.engines[5:]", "0 engines NewtonIntegrator"),
+            ("O.engines = [O.engines[4]] + O.engines[:4]", "NewtonIntegrator last"),
+            ("1 / 0", "failed: ZeroDivisionError"),
+            ("O.bodies.append(box((0.05, 0.05, 0.05), (0.001,) * 3))", "is a Box"),
+            ("O.bodies[3].dynamic = False", "Body 3 of the YADE scene is held"),
+        ):
+            with self.subTest(reason), self.assertRaisesRegex(ValueError, reason):
+                engine().make_template(self.script(end="O.step()\n" + extra))
+
+    def test_missing_script(self):
+        with self.assertRaisesRegex(ValueError, "ve.script = .*no such file"):
+            engine().make_template({"source": "script", "script": "/nowhere/theirs.py"})
+
+
+class Scene(Folder):
+    def test_saved_scenes_serve_as_they_are(self):
+        ve = element(FRICTION)
+        O = select(ve)
+        engine().deform(ve, rate(ve, 5e-3, np.diag([0.5, -1.0, 0.5])), 20)
+        for name in ("a.yade.gz", "b.xml.bz2"):
+            path = self.folder / name
+            select(ve)
+            O.save(str(path))
+            made = engine().make_template({"source": "scene", "scene": str(path)})
+            other = engine().add(made["state"])
+            stress, _, F = measure(other)
+            np.testing.assert_array_equal(F, np.eye(3))
+            np.testing.assert_allclose(stress, measure(ve)[0], rtol=0, atol=1e-9 * 1e5)
+            self.assertIn("velocity gradient of the cell set to zero", made["manifest"]["reset"])
+
+    def test_missing_and_broken_scenes(self):
+        with self.assertRaisesRegex(ValueError, "ve.scene = .*no such file"):
+            engine().make_template({"source": "scene", "scene": "/nowhere/scene.yade.gz"})
+        broken = self.folder / "broken.xml"
+        broken.write_text("<nothing/>")
+        with self.assertRaisesRegex(ValueError, "cannot be loaded"):
+            engine().make_template({"source": "scene", "scene": str(broken)})
+
+
+@unittest.skipUnless(EXAMPLES.is_dir(), "YADE's examples are not installed")
+class ShippedExamples(unittest.TestCase):
+    """Scripts of YADE's package, unedited: volume elements, or refused with the true reason."""
+
+    SERVE = (
+        "PeriodicBoundaries/cellFlipping.py",
+        "PeriodicBoundaries/periodic-grow.py",
+        "PeriodicBoundaries/periodic-simple-shear.py",
+        "PeriodicBoundaries/periodic-triax.py",
+        "PeriodicBoundaries/peri3dController_triaxialCompression.py",
+        "FEMxDEM/prepareRVE.py",
+        "concrete/periodic.py",
+    )
+    REFUSED = {
+        "PeriodicBoundaries/periodic-shear.py": "Body 0 of the YADE scene is a Facet",
+        "PeriodicBoundaries/periodicSandPile.py": "Body 0 of the YADE scene is a Box",
+        "PeriodicBoundaries/periodic-simple.py": "has the engine TranslationEngine",
+    }
+
+    def make(self, name):
+        with tempfile.TemporaryDirectory() as folder:  # the scripts write where they run
+            here = os.getcwd()
+            os.chdir(folder)
+            try:
+                return engine().make_template({"source": "script", "script": str(EXAMPLES / name), "script_seconds": 20.0})
+            finally:
+                os.chdir(here)
+
+    def test_serve(self):
+        for name in self.SERVE:
+            with self.subTest(name):
+                ve = engine().add(self.make(name)["state"])
+                L = np.diag([0.0, -1e-5, 0.0]) / engine().info(ve)["time_step"]
+                engine().deform(ve, L, 20)
+                stress, report, F = measure(ve)
+                self.assertAlmostEqual(F[1, 1], (1 - 1e-5) ** 20, delta=1e-13)
+                self.assertTrue(np.isfinite(stress).all() and stress.any())
+                self.assertGreater(report["contacts"], 0)
+                engine().remove(ve)
+
+    def test_refused(self):
+        for name, reason in self.REFUSED.items():
+            with self.subTest(name), self.assertRaisesRegex(ValueError, reason):
+                self.make(name)
+
+
+if __name__ == "__main__":
+    unittest.main()
