@@ -120,6 +120,8 @@ struct BodyForce {
   double x = 0.0, y = 0.0;  ///< force per current volume [N/m^3]
 };
 
+enum class ControlMode { time, measure, automatic };
+enum class Measure { displacement_x, displacement_y, opening, volume };
 struct ControlParameters {
   double end_time = kNotGiven;     ///< [s]
   double step = kNotGiven;         ///< first step [s]
@@ -128,6 +130,12 @@ struct ControlParameters {
   double growth = 1.3;             ///< factor on the step after a quick one [-]
   int max_iterations_to_grow = 6;  ///< a step is quick up to so many iterations
   double cut = 0.5;                ///< factor on the step after a failure [-]
+  ControlMode mode = ControlMode::time;
+  std::vector<std::string> loads;  ///< edges whose tractions and pressures get an unknown factor, unless mode is time
+  Measure measure = Measure::opening;  ///< what is prescribed in its place (ControlMeasure)
+  std::string measure_edge;
+  std::string against_edge;  ///< whose measure is subtracted, or empty
+  double rate = kNotGiven;   ///< of the measure [m/s, m^2/s]
 };
 
 enum class GlobalOperator { quasi_newton, elastic, tangent, perturbation };
@@ -145,12 +153,15 @@ struct SolverParameters {
   double accept_best_factor = 1.0;  ///< best iterate accepted below this times the tolerance, and flagged [-]
   Acceleration acceleration = Acceleration::none;
   int anderson_depth = 5;
+  double anderson_truncation = 1e-2;  ///< least diagonal entry of the triangular factor over the largest [-]
   bool line_search = false;
+  double noise = 0.0;    ///< relative jitter of the stress of a volume element, measured; 0: not known [-]
   double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
   double qn_max = 1.2;
   double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
   double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
-  double start_amplitude = 0.0;  ///< seeded random start of the first step / its displacement [-]
+  double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
+  double start_time = 0.0;       ///< of the step that goes beyond this time [s]
   int start_seed = 1;
   double penalty = 100.0;  ///< augmented Lagrangian: r / Young-like modulus of the element [-]
 };

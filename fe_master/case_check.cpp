@@ -14,6 +14,10 @@ namespace femxdem {
 
 namespace {
 
+/// Least force tolerance over the relative noise of the stress: below it, the residual of a mesh in equilibrium is
+/// noise.
+constexpr double kNoiseMargin = 30;
+
 using Keys = std::vector<std::string>;
 
 bool volume_elements(const Case& c) { return c.material.type == MaterialType::volume_element; }
@@ -199,11 +203,55 @@ void check_control(const Case& c, Mistakes& m) {
   if (c.control.max_step < c.control.step) m.add("control.max_step", "control.max_step is below step; raise it");
 }
 
+/// Control by a measure of the displacements, from the start or automatic.
+void check_control_measure(const Case& c, const std::optional<std::set<std::string>>& edges, Mistakes& m) {
+  const Keys keys = {"loads", "measure", "measure_edge"};
+  if (c.control.mode == ControlMode::time) {
+    for (const char* key : {"loads", "measure", "measure_edge", "against_edge", "rate"}) {
+      if (m.has(fmt::format("control.{}", key)))
+        m.add(fmt::format("control.{}", key),
+              fmt::format("{} is of no use with control.mode = \"time\"; set mode, or remove it", key));
+    }
+    return;
+  }
+  require(m, "control", keys, "for this control.mode");
+  if (c.control.mode == ControlMode::measure) require(m, "control", {"rate"}, "for mode = \"measure\"");
+  if (c.control.mode == ControlMode::automatic && m.has("control.rate"))
+    m.add("control.rate", "rate is of no use with mode = \"automatic\", which goes on at the rate it finds; remove it");
+  if (c.control.measure == Measure::volume && !c.control.against_edge.empty())
+    m.add("control.against_edge", "against_edge is of no use with measure = \"volume\"; remove it");
+  if (!edges || m.wrong("control")) return;
+  require_known(c.control.measure_edge, *edges, "edge", "control.measure_edge", m);
+  if (!c.control.against_edge.empty()) require_known(c.control.against_edge, *edges, "edge", "control.against_edge", m);
+  const Load* first = nullptr;
+  for (const std::string& edge : c.control.loads) {
+    const auto is_force = [&](const Load& load) {
+      return load.edge == edge && (load.kind == LoadKind::traction || load.kind == LoadKind::pressure);
+    };
+    const auto load = std::find_if(c.loads.begin(), c.loads.end(), is_force);
+    if (load == c.loads.end()) {
+      m.add("control.loads", fmt::format("edge '{}' has neither a traction nor a pressure; name one that has", edge));
+    } else if (first != nullptr && first->table != load->table) {
+      m.add("control.loads", fmt::format("the loads of edges '{}' and '{}' have different tables but one factor; give "
+                                         "them the same table",
+                                         first->edge, edge));
+    } else {
+      first = &*load;
+    }
+  }
+}
+
 void check_solver(const Case& c, Mistakes& m) {
   if (volume_elements(c) && c.solver.global_operator == GlobalOperator::tangent)
     m.add("solver.operator",
           "solver.operator = \"tangent\" needs a law in closed form; for volume elements use "
           "quasi_newton, elastic or perturbation");
+  const double floor = kNoiseMargin * c.solver.noise;
+  if (is_given(c.solver.tolerance) && c.solver.tolerance < floor)
+    m.add("solver.tolerance",
+          fmt::format("solver.tolerance = {:g} is below {:.1e}, which the noise {:g} of the volume element's stress "
+                      "allows; raise it, or lower ve.inertial_number or take more spheres and measure again",
+                      c.solver.tolerance, floor, c.solver.noise));
   if (c.solver.qn_min >= c.solver.qn_max) m.add("solver.qn_min", "solver.qn_min is not below qn_max; lower it");
 }
 
@@ -316,6 +364,7 @@ void check_case(const Case& c, Purpose purpose, Mistakes& m) {
   const std::optional<std::set<std::string>> edges = edge_names(c, mesh, m);
   check_loads(c, edges, m);
   check_control(c, m);
+  check_control_measure(c, edges, m);
   check_monitors(c, edges, regions, m);
 }
 

@@ -205,7 +205,17 @@ Section<ControlParameters> control_section() {
        parameter("growth", &C::growth, "", kAtLeastOne, "factor on the step after a quick one"),
        parameter("max_iterations_to_grow", &C::max_iterations_to_grow, "", kAtLeastOne,
                  "a step is quick up to so many iterations"),
-       parameter("cut", &C::cut, "", {0.0, 1.0, true}, "factor on the step after a failure")}};
+       parameter("cut", &C::cut, "", {0.0, 1.0, true}, "factor on the step after a failure"),
+       word("mode", &C::mode, {"time", "measure", "automatic"},
+            "what drives the steps: time; a measure of the displacements, the factor of control.loads being unknown; "
+            "or the one until a limit point is near, then the other"),
+       parameter("loads", &C::loads, "", kAny, "edges whose tractions and pressures have the unknown factor"),
+       word("measure", &C::measure, {"displacement_x", "displacement_y", "opening", "volume"},
+            "of measure_edge: mean displacement; opening: against the outward normal; volume: of the cavity about the "
+            "origin"),
+       parameter("measure_edge", &C::measure_edge, "", kAny, "edge that is measured"),
+       parameter("against_edge", &C::against_edge, "", kAny, "edge whose mean is subtracted"),
+       parameter("rate", &C::rate, "m/s, m2/s", kAny, "of the measure, for mode = \"measure\"")}};
 }
 
 Section<SolverParameters> solver_section() {
@@ -227,13 +237,18 @@ Section<SolverParameters> solver_section() {
                  "the best iterate is accepted, and flagged, below this times the tolerance"),
        word("acceleration", &S::acceleration, {"none", "anderson"}, "on top of the operator"),
        parameter("anderson_depth", &S::anderson_depth, "", {1.0, 50.0}, "iterates remembered"),
+       parameter("anderson_truncation", &S::anderson_truncation, "", {0.0, 1.0},
+                 "columns that say less than this are dropped; 10 x noise / tolerance is sound"),
        parameter("line_search", &S::line_search, "", kAny, "on the residual; each trial costs an evaluation"),
+       parameter("noise", &S::noise, "", kNotNegative,
+                 "stress noise of the volume element (femxdem ve path --noise): a tolerance within it is refused"),
        parameter("qn_min", &S::qn_min, "", kAny, "learned tangent: least eigenvalue, elastic metric"),
        parameter("qn_max", &S::qn_max, "", kPositive, "learned tangent: largest eigenvalue, elastic metric"),
        parameter("qn_skew", &S::qn_skew, "", kNotNegative, "learned tangent: norm of the skew part, elastic metric"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
-                 "random start of the first step / its displacement"),
+                 "random start of one step / its displacement: finds other solutions"),
+       parameter("start_time", &S::start_time, "s", kNotNegative, "the random start is that of the step past this"),
        parameter("start_seed", &S::start_seed, "", kNotNegative, "of the random start"),
        parameter("penalty", &S::penalty, "", kPositive, "augmented Lagrangian: r / elastic modulus")}};
 }

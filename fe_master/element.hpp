@@ -66,6 +66,9 @@ class Element {
 
   /// Start of a load step, also after a rejected one: x becomes the committed unknowns (increments are 0 there).
   virtual void begin_step(Eigen::VectorXd& x);
+  /// Multipliers of the constraints, all elements; empty without constraints.
+  virtual Eigen::VectorXd multipliers() const { return {}; }
+  virtual void set_multipliers(const Eigen::VectorXd& /*values*/) {}
   /// Multipliers after the unknowns have changed to x.
   virtual void update_multipliers(const Eigen::VectorXd& /*x*/) {}
   /// Extrapolates the unknowns and multipliers of the last step, factor times, onto x (set to the committed ones

@@ -27,6 +27,9 @@ class PointOperators {
   /// Whether the matrix made at the start of a step serves all its iterations.
   bool constant_in_step() const { return symmetric() && parameters_.refresh != Refresh::iteration; }
 
+  /// Whether the operator depends on the trial alone, not on the ones before it.
+  bool memoryless() const { return parameters_.global_operator != GlobalOperator::quasi_newton; }
+
   /// Start of a step from the committed deformation gradients and responses.
   void begin_step(std::span<const Tensor2> F, std::span<const Response> responses);
   /// Takes note of a trial's responses.

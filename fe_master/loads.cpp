@@ -43,6 +43,7 @@ Loads::Loads(const Element& element, double end_time) : element_(element), end_t
 
 Loads::Loads(const Case& c, const Element& element) : Loads(element, c.control.end_time) {
   body_force = c.body_force;
+  if (c.control.mode != ControlMode::time) release(c.control.loads);
   for (const Load& load : c.loads) add(load);
 }
 
@@ -89,9 +90,35 @@ Eigen::VectorXd Loads::prescribed(double t_n, double t) const {
   return values;
 }
 
-Eigen::VectorXd Loads::external_force(const Eigen::VectorXd& x, double t) const {
+bool Loads::is_released(const Load& load) const {
+  return std::find(released_.begin(), released_.end(), load.edge) != released_.end();
+}
+
+double Loads::released_factor(double t) const {
+  for (const Load& load : forces_) {
+    if (is_released(load)) return load_factor(load, t, end_time_);
+  }
+  return 0;
+}
+
+Eigen::VectorXd Loads::released_force(const Eigen::VectorXd& x) const {
   Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
-  for (const Load& load : forces_) add_edge_force(load, x, load.value * load_factor(load, t, end_time_), f);
+  for (const Load& load : forces_) {
+    if (is_released(load)) add_edge_force(load, x, load.value, f);
+  }
+  return f;
+}
+
+Eigen::VectorXd Loads::external_force(const Eigen::VectorXd& x, double t) const {
+  return external_force(x, t, released_factor(t));
+}
+
+Eigen::VectorXd Loads::external_force(const Eigen::VectorXd& x, double t, double released_factor) const {
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
+  for (const Load& load : forces_) {
+    const double factor = is_released(load) ? released_factor : load_factor(load, t, end_time_);
+    add_edge_force(load, x, load.value * factor, f);
+  }
   if (body_force.x == 0 && body_force.y == 0) return f;
   const std::vector<Tensor2> F = element_.deformation(x);
   for (std::size_t p = 0; p < element_.points(); ++p) {

@@ -29,10 +29,21 @@ class Loads {
   /// Nodal forces of tractions, follower pressures and body forces at time t on the configuration x [N/m].
   Eigen::VectorXd external_force(const Eigen::VectorXd& x, double t) const;
 
+  /// The tractions and pressures of these edges get a factor of their own in the place of their tables: unknown to
+  /// the loads, the same for all of them.
+  void release(const std::vector<std::string>& edges) { released_ = edges; }
+  /// Factor that their tables give at time t (of the first one; 0 where none is released) [-].
+  double released_factor(double t) const;
+  /// As above with this factor of the released loads.
+  Eigen::VectorXd external_force(const Eigen::VectorXd& x, double t, double released_factor) const;
+  /// Nodal forces of the released loads at factor 1 [N/m].
+  Eigen::VectorXd released_force(const Eigen::VectorXd& x) const;
+
   /// Force per current volume [N/m^3].
   BodyForce body_force;
 
  private:
+  bool is_released(const Load& load) const;
   void add_edge_force(const Load& load, const Eigen::VectorXd& x, double factor, Eigen::VectorXd& f) const;
 
   struct Prescribed {
@@ -43,6 +54,7 @@ class Loads {
   double end_time_;
   std::vector<Prescribed> prescribed_;  // ascending in dof
   std::vector<Load> forces_;            // tractions and pressures
+  std::vector<std::string> released_;   // edges
 };
 
 /// Nodes of a named edge, each once, in order along it.

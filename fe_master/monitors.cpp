@@ -28,11 +28,13 @@ double deformed_length(const Mesh& mesh, const std::string& edge, const Eigen::V
   return length;
 }
 
-double pressure(const Case& c, const std::string& edge, double time) {
+double pressure(const Case& c, const std::string& edge, const Equilibrium& state) {
+  const auto& loads = c.control.loads;
+  const bool released = c.control.mode != ControlMode::time && std::count(loads.begin(), loads.end(), edge) > 0;
   double sum = 0;
   for (const Load& load : c.loads) {
     if (load.kind == LoadKind::pressure && load.edge == edge)
-      sum += load.value * load_factor(load, time, c.control.end_time);
+      sum += load.value * (released ? state.load_factor : load_factor(load, state.time, c.control.end_time));
   }
   return sum;
 }
@@ -68,7 +70,7 @@ double value(const Case& c, const Element& element, const Equilibrium& state, co
     case Quantity::length:
       return deformed_length(mesh, monitor.edge, state.x);
     case Quantity::pressure:
-      return pressure(c, monitor.edge, state.time);
+      return pressure(c, monitor.edge, state);
     case Quantity::stress_xx:
       return mean_stress(element, monitor.region, state, 0, 0);
     case Quantity::stress_yy:

@@ -162,6 +162,16 @@ void SecondGradientQ8::begin_step(Eigen::VectorXd& x) {
   lambda_ = lambda_n_;
 }
 
+Eigen::VectorXd SecondGradientQ8::multipliers() const {
+  Eigen::VectorXd values(4 * static_cast<Eigen::Index>(lambda_.size()));
+  for (std::size_t e = 0; e < lambda_.size(); ++e) values.segment<4>(4 * static_cast<Eigen::Index>(e)) = lambda_[e];
+  return values;
+}
+
+void SecondGradientQ8::set_multipliers(const Eigen::VectorXd& values) {
+  for (std::size_t e = 0; e < lambda_.size(); ++e) lambda_[e] = values.segment<4>(4 * static_cast<Eigen::Index>(e));
+}
+
 void SecondGradientQ8::update_multipliers(const Eigen::VectorXd& x) {
   for (std::size_t e = 0; e < lambda_.size(); ++e) lambda_[e] += penalty_ * gap(static_cast<int>(e), x);
 }

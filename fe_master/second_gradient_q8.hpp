@@ -34,6 +34,8 @@ class SecondGradientQ8 : public Element {
   Eigen::MatrixXd matrix(int e, const Eigen::VectorXd& x, std::span<const Tensor2> F, std::span<const Tensor4> dPdF,
                          bool exact) const override;
   void begin_step(Eigen::VectorXd& x) override;
+  Eigen::VectorXd multipliers() const override;
+  void set_multipliers(const Eigen::VectorXd& values) override;
   void update_multipliers(const Eigen::VectorXd& x) override;
   void extrapolate(Eigen::VectorXd& x, double factor) override;
   void commit(const Eigen::VectorXd& x) override;

@@ -47,6 +47,7 @@ class Run {
   Log log_;
   std::unique_ptr<Element> element_;
   Loads loads_;
+  StepControl control_;
   NonlinearSolver solver_;
   History history_;
   Results results_;
@@ -82,6 +83,7 @@ Run::Run(const Case& c, const Mesh& mesh, MaterialPoints& points, const RunOptio
       log_(options.folder / "log.txt", options.existing),
       element_(make_element(c, mesh)),
       loads_(c, *element_),
+      control_(c.control, mesh),
       solver_(*element_, points, loads_,
               with_default_tolerances(c.solver, c.material.type == MaterialType::volume_element)),
       history_(options.folder / "history.csv", monitor_names(c), options.existing, resumed_.step),
@@ -127,12 +129,12 @@ int Run::go() {
 
 int Run::advance() {
   const double end = case_.control.end_time;
-  while (solver_.committed().time < end * (1 - kTimeRoundOff)) {
-    if (step()) continue;
-    if (dt_ < case_.control.min_step) return last_.failure ? kPointFailed : kNotConverged;
+  int status = kDone;
+  while (status == kDone && solver_.committed().time < end * (1 - kTimeRoundOff)) {
+    if (!step() && dt_ < case_.control.min_step) status = last_.failure ? kPointFailed : kNotConverged;
   }
   if (summary_.steps % case_.output.every != 0) write_fields();
-  return kDone;
+  return status;
 }
 
 /// One attempt; on success everything about it is on the disk.
@@ -141,7 +143,7 @@ bool Run::step() {
   const bool to_the_end = time + dt_ > end * (1 - kTimeRoundOff);
   const double dt = to_the_end ? end - time : dt_;
   Equilibrium start = solver_.committed();
-  last_ = solver_.solve_step(dt);
+  last_ = solver_.solve_step(dt, control_.target(start, dt));
   record_.evaluations += last_.evaluations;
   record_.dem_steps += last_.dem_steps;
   std::vector<IterationRecord> table;
@@ -149,20 +151,28 @@ bool Run::step() {
     record_.dem_seconds += i.engine_seconds;
     summary_.evaluate_seconds += i.evaluate_seconds;
     table.push_back({static_cast<int>(table.size()) + 1, i.residual, i.correction, i.longest_point,
-                     i.engine_seconds / static_cast<double>(points_.size()), 0, i.solve_seconds, ""});
+                     i.engine_seconds / static_cast<double>(points_.size()), 0, i.solve_seconds, i.note});
   }
   if (!last_.converged) {
-    dt_ = dt * case_.control.cut;
-    log_.say(fmt::format("step {} to time {:.6g} rejected: {}{}", summary_.steps + 1, time + dt, last_.reason,
-                         dt_ < case_.control.min_step ? "" : fmt::format("; again with a step of {:.3g}", dt_)));
+    const bool passes_on = control_.rejected();
+    dt_ = passes_on ? dt : dt * case_.control.cut;
+    const std::string next = passes_on                      ? "; again, driven by the " + control_.description()
+                             : dt_ < case_.control.min_step ? ""
+                                                            : fmt::format("; again with a step of {:.3g}", dt_);
+    log_.say(fmt::format("step {} to time {:.6g} rejected: {}{}", summary_.steps + 1, time + dt, last_.reason, next));
+    for (const IterationRecord& i : table) {
+      log_.note(fmt::format("  {:3} |r|/|f| {:.2e} |du|/|u| {:.2e} {}", i.iteration, i.residual, i.correction, i.note));
+    }
     if (last_.failure) log_.say(fmt::format("  {}", last_.failure->advice));
     return false;
   }
+  if (control_.accepted(start, solver_.committed()))
+    log_.say(fmt::format("limit point near: the load factor is now found by the {}", control_.description()));
   before_ = std::move(start);
   const Equilibrium& now = solver_.committed();
   record_.step = summary_.steps + 1;
   record_.time = now.time;
-  record_.load_factor = now.time / end;
+  record_.load_factor = case_.control.mode == ControlMode::time ? now.time / end : now.load_factor;
   record_.iterations = last_.iterations();
   record_.residual = last_.table.back().residual;
   record_.wall_seconds = wall();
@@ -200,7 +210,8 @@ void Run::write_fields() {
   fields.point_fields.push_back({"least_tangent_eigenvalue", 1, solver_.operators().least_eigenvalues()});
   Field displacement{"displacement", 2, {}};
   Field residual{"residual", 2, {}};
-  const Eigen::VectorXd out_of_balance = now.external - now.internal;
+  Eigen::VectorXd out_of_balance = now.external - now.internal;
+  for (const int dof : loads_.prescribed_dofs()) out_of_balance[dof] = 0;  // reactions
   for (std::size_t i = 0; i < 2 * mesh.nodes.size(); ++i) {
     displacement.values.push_back(now.x[static_cast<Eigen::Index>(i)]);
     residual.values.push_back(out_of_balance[static_cast<Eigen::Index>(i)]);
@@ -225,6 +236,7 @@ void Run::write_fields() {
 void Run::write_state() {
   Checkpoint checkpoint{summary_.steps, solver_.committed().time, dt_, {}, {}, summary_.case_hash, options_.versions};
   solver_.save(checkpoint.arrays);
+  control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back("run.counts",
                                  std::vector<double>{static_cast<double>(summary_.evaluations), summary_.dem_steps});
   checkpoint.states = points_.save();
@@ -235,6 +247,7 @@ void Run::write_state() {
 void Run::restart() {
   points_.load(resumed_.states);
   solver_.load(resumed_.arrays);
+  control_.load(resumed_.arrays);
   before_ = solver_.committed();
   dt_ = resumed_.dt;
   summary_.steps = resumed_.step;

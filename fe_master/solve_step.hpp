@@ -4,8 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "acceleration.hpp"
 #include "assembler.hpp"
 #include "case.hpp"
+#include "control.hpp"
 #include "element.hpp"
 #include "global_operator.hpp"
 #include "linear_solver.hpp"
@@ -16,13 +18,14 @@ namespace femxdem {
 
 /// One equilibrium iteration: one evaluation of all points (and its probes), and the correction that it asks for.
 struct Iteration {
-  double residual = 0;          ///< free forces over reactions and external forces [-]
-  double correction = 0;        ///< displacement correction over the step's displacement [-]
-  double gap = 0;               ///< constraint of the second gradient over the step's micro gradient [-]
+  double residual = 0;    ///< free forces over reactions and external forces [-]
+  double correction = 0;  ///< displacement correction over the step's displacement [-]
+  double gap = 0;         ///< constraints: second gradient over the step's micro gradient, measure over its change [-]
   double engine_seconds = 0;    ///< inside the DEM engine, all points [s]
   double longest_point = 0;     ///< the busiest point [s]
   double evaluate_seconds = 0;  ///< wall time of the evaluation [s]
   double solve_seconds = 0;     ///< wall time of assembly and solution [s]
+  std::string note;             ///< what was special about it; mostly empty
 };
 
 /// What became of a step.
@@ -40,8 +43,10 @@ struct StepResult {
 
 /// A state in equilibrium.
 struct Equilibrium {
-  double time = 0;    ///< [s]
-  Eigen::VectorXd x;  ///< unknowns (Element)
+  double time = 0;              ///< [s]
+  Eigen::VectorXd x;            ///< unknowns (Element)
+  Eigen::VectorXd multipliers;  ///< of the constraints (Element)
+  double load_factor = 0;       ///< of the released loads (Loads::release) [-]
   std::vector<Tensor2> F;
   std::vector<Response> responses;
   Eigen::VectorXd internal, external;  ///< nodal forces of all unknowns [N/m]; their difference is the reaction
@@ -56,8 +61,9 @@ class NonlinearSolver {
   /// Evaluates the undeformed state. Throws UserError when a point cannot answer it.
   NonlinearSolver(Element& element, MaterialPoints& points, const Loads& loads, const SolverParameters& parameters);
 
-  /// Solves the step from the committed state to time t_n + dt and commits it if it converges.
-  StepResult solve_step(double dt);
+  /// Solves the step from the committed state to time t_n + dt and commits it if it converges. With a target, the
+  /// factor of the released loads is an unknown and the measure's value the equation for it.
+  StepResult solve_step(double dt, const std::optional<MeasureTarget>& target = {});
 
   const Equilibrium& committed() const { return committed_; }
   const PointOperators& operators() const { return operators_; }
@@ -69,11 +75,24 @@ class NonlinearSolver {
   void load(const NamedArrays& arrays);
 
  private:
+  void begin_step(Equilibrium& trial, double dt);
   void predict(Equilibrium& trial, double dt);
+  void start_at_random(Equilibrium& trial) const;
   bool evaluate(Equilibrium& trial, StepResult& result);
-  std::optional<Eigen::VectorXd> correction(const Equilibrium& at, const Eigen::VectorXd& x,
-                                            const Eigen::VectorXd& residual, const Eigen::VectorXd& change);
+  struct Correction {
+    Eigen::VectorXd x;
+    double load_factor = 0;
+  };
+  std::optional<Correction> correction(const Equilibrium& at, const Eigen::VectorXd& x, const Eigen::VectorXd& residual,
+                                       const Eigen::VectorXd& change);
+  bool add_load_factor(const Eigen::VectorXd& x, Correction& c) const;
+  double gap(const Equilibrium& trial) const;
+  std::optional<Eigen::VectorXd> correct(const Equilibrium& trial, Iteration& now);
+  Eigen::VectorXd unknowns(const Equilibrium& trial) const;
+  void move(Equilibrium& trial, const Eigen::VectorXd& z);
+  AndersonAcceleration acceleration() const;
   bool converged(const Iteration& iteration) const;
+  bool accept_best(Equilibrium& best, StepResult& result);
   void commit(Equilibrium& trial, double dt);
 
   Element& element_;
@@ -87,6 +106,8 @@ class NonlinearSolver {
   Equilibrium committed_;
   Eigen::VectorXd last_external_change_;  // of the last committed step
   double last_dt_ = 0;
+  double last_factor_change_ = 0;
+  std::optional<MeasureTarget> target_;  // of the step under way
   PointOperators operators_;
 };
 
