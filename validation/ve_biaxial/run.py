@@ -1,0 +1,83 @@
+#!/usr/bin/python3
+"""The paper's volume element along the biaxial's path, several seeds: curves, peak, value at the end.
+
+    validation/ve_biaxial/run.py [--femxdem PROGRAM] [--out FOLDER] [--seeds 1 2 3] [--spheres N]
+
+Writes FOLDER/table.md and ve_biaxial.png; runs that are done already are not repeated.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+from results import path_curve, read_history
+
+
+def run(program, folder, seed, spheres):
+    summary = folder / "summary.json"
+    if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
+        subprocess.run([program, "ve", "path", HERE / "case.toml", "--out", folder, "--overwrite", "--set", f"ve.seed={seed}",
+                        "--set", f"ve.spheres={spheres}"], check=True, stdout=subprocess.DEVNULL)
+    return json.loads(summary.read_text())
+
+
+def row(folder, seed, summary):
+    """Markdown row: peak, where, value at the end, porosity at start and end, what it cost."""
+    curve, h = path_curve(folder), read_history(folder)
+    peak = int(np.argmax(curve.stress))
+    cells = [seed, f"{curve.stress[peak]:.2f}", f"{100 * curve.strain[peak]:.1f}", f"{curve.stress[-10:].mean():.2f}",
+             f"{h['porosity'][0]:.3f}", f"{h['porosity'][-1]:.3f}", f"{h['evaluations'][1:].mean():.2f}",
+             f"{h['evaluations'].max():.0f}", f"{summary['engine_seconds']:.0f}"]
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def draw(folders, file):
+    figure, (stress, volume) = plt.subplots(1, 2, figsize=(8, 3.2))
+    for seed, folder in folders.items():
+        curve, h = path_curve(folder), read_history(folder)
+        volumetric = h["strain_xx"] + h["strain_yy"] + h["strain_zz"]
+        stress.plot(100 * curve.strain, curve.stress, linewidth=1, label=f"seed {seed}")
+        volume.plot(100 * curve.strain, 100 * volumetric, linewidth=1)
+    stress.set_ylabel(r"axial stress / $\sigma_0$")
+    volume.set_ylabel("volumetric strain [%] (dilation positive)")
+    for axes in (stress, volume):
+        axes.set_xlabel("axial strain [%] (nominal, compression positive)")
+        axes.grid(alpha=0.3)
+    stress.legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(file, dpi=100)
+
+
+HEADER = """| seed | peak / sigma_0 | at [%] | at the end (mean of 10) | porosity, start | end | evaluations a step | most | DEM s |
+|---|---|---|---|---|---|---|---|---|
+"""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
+    parser.add_argument("--out", type=Path, default=Path("out/ve_biaxial"))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--spheres", type=int, default=1000)
+    a = parser.parse_args()
+    folders, rows = {}, []
+    for seed in a.seeds:
+        folders[seed] = a.out / f"seed_{seed}"
+        rows.append(row(folders[seed], seed, run(Path(a.femxdem).resolve(), folders[seed], seed, a.spheres)))
+        print(rows[-1], flush=True)
+    (a.out / "table.md").write_text(HEADER + "\n".join(rows) + "\n")
+    draw(folders, a.out / "ve_biaxial.png")
+
+
+if __name__ == "__main__":
+    main()
