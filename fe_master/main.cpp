@@ -86,7 +86,9 @@ std::vector<int> templates_of_points(const VePool& pool) {
 int run_on_volume_elements(const Case& c, const Mesh& mesh, RunOptions options) {
   WorkerProcess worker({});
   const Mpi mpi;
-  PythonVolumeElements local(worker, ve_options(c.ve));
+  VolumeElementOptions ve = ve_options(c.ve);
+  ve.say = [rank = mpi.rank](std::string_view remark) { std::cerr << "rank " << rank << ": " << remark << std::endl; };
+  PythonVolumeElements local(worker, ve);
   if (mpi.rank > 0) {
     if (!mpi.agree(true)) return kBadInput;
     serve(MPI_COMM_WORLD, local);

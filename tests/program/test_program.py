@@ -1,0 +1,150 @@
+"""The program as its users run it, on real volume elements: ranks, restart, killed processes, exit statuses.
+
+    test_program.py FEMXDEM CASE      FEMXDEM: the executable; CASE: a small case on volume elements
+"""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
+TIME_COLUMNS = ("dem_seconds", "wall_s")
+FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
+CACHE = Path(FOLDER.name) / "packings"
+
+
+def command(out, *arguments, ranks=1):
+    mpirun = ["mpirun", "--oversubscribe", "-n", str(ranks)]
+    if os.geteuid() == 0:
+        mpirun.insert(1, "--allow-run-as-root")
+    return mpirun + [str(FEMXDEM), "run", str(CASE), "--out", str(out), "--set", f've.cache="{CACHE}"', *arguments]
+
+
+def run(name, *arguments, ranks=1):
+    """Runs the case into a folder of its own; (folder, exit status, what it said)."""
+    out = Path(FOLDER.name) / name
+    done = subprocess.run(command(out, *arguments, ranks=ranks), capture_output=True, text=True, timeout=600)
+    return out, done.returncode, done.stdout + done.stderr
+
+
+def history(out):
+    """Rows of history.csv as text, without the columns that depend on the clock."""
+    with open(out / "history.csv") as file:
+        return [{k: v for k, v in row.items() if k not in TIME_COLUMNS} for row in csv.DictReader(file)]
+
+
+def workers():
+    """{pid: parent} of all worker processes of this executable that still run."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        try:
+            if entry.name.isdigit() and os.readlink(entry / "exe") == str(FEMXDEM.with_name("femxdem-worker").resolve()):
+                fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+                if fields[0] != "Z":
+                    found[int(entry.name)] = int(fields[1])
+        except OSError:
+            continue
+    return found
+
+
+def below(processes, ancestor):
+    """Of {pid: parent}, those that descend from the process `ancestor`."""
+    mine = {ancestor}
+    for _ in range(8):
+        mine |= {pid for pid, parent in processes.items() if parent in mine}
+    return mine - {ancestor}
+
+
+def ranks_of(mpirun):
+    """Processes of the program that this mpirun has started."""
+    children = Path(f"/proc/{mpirun.pid}/task/{mpirun.pid}/children").read_text().split()
+    return [int(pid) for pid in children if os.readlink(f"/proc/{pid}/exe") == str(FEMXDEM.resolve())]
+
+
+class Program(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder, status, said = run("reference")
+        assert status == 0, said
+        cls.reference = history(cls.folder)
+
+    def test_every_file_is_there(self):
+        for name in ("results.h5", "results.xdmf", "history.csv", "summary.json", "case.toml", "log.txt", "checkpoint.h5"):
+            self.assertTrue((self.folder / name).stat().st_size > 0, name)
+        summary = json.loads((self.folder / "summary.json").read_text())
+        self.assertEqual((summary["status"], summary["exit_status"], summary["steps"]), ("done", 0, 6))
+        self.assertIn("yade", summary["versions"])
+        self.assertEqual([row["step"] for row in self.reference], ["1", "2", "3", "4", "5", "6"])
+
+    def test_2_and_4_ranks_give_the_same_bits(self):
+        for ranks in (2, 4):
+            out, status, said = run(f"ranks{ranks}", ranks=ranks)
+            self.assertEqual(status, 0, said)
+            self.assertEqual(history(out), self.reference)
+
+    def test_killed_rank_leaves_no_worker_and_the_restart_equals_the_uninterrupted_run(self):
+        out = Path(FOLDER.name) / "restart"
+        mpirun = subprocess.Popen(command(out, ranks=2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while not ((out / "history.csv").exists() and len(history(out)) >= 3):
+            self.assertIsNone(mpirun.poll(), "the run ended before it could be killed")
+            time.sleep(0.02)
+        before = below(workers() | {r: mpirun.pid for r in ranks_of(mpirun)}, mpirun.pid)
+        os.kill(ranks_of(mpirun)[0], signal.SIGKILL)
+        time.sleep(2)
+        self.assertEqual(before & workers().keys(), set())
+        mpirun.wait(timeout=60)
+        self.assertLess(len(history(out)), 6)
+        _, status, said = run("restart", "--restart", ranks=2)
+        self.assertEqual(status, 0, said)
+        self.assertEqual(history(out), self.reference)
+
+    def test_a_killed_trial_does_not_change_the_result(self):
+        out = Path(FOLDER.name) / "killed"
+        remarks = Path(FOLDER.name) / "remarks.txt"
+        mpirun = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=open(remarks, "w"))
+        killed = 0
+        while mpirun.poll() is None:
+            processes = workers()
+            mine = below(processes | {r: mpirun.pid for r in ranks_of(mpirun)} if mpirun.poll() is None else {}, mpirun.pid)
+            trials = [pid for pid in mine if processes.get(pid) in processes]
+            if trials and killed < 3 and (out / "history.csv").exists():
+                os.kill(trials[0], signal.SIGSEGV)
+                killed += 1
+                time.sleep(0.5)
+            time.sleep(0.01)
+        self.assertEqual(mpirun.returncode, 0)
+        self.assertGreater(killed, 0)
+        self.assertIn("repeated", remarks.read_text())
+        self.assertEqual(history(out), self.reference)
+
+    def test_bad_input_ends_with_2(self):
+        _, status, said = run("bad", "--set", "ve.frction=0.3")
+        self.assertEqual(status, 2)
+        self.assertIn("friction", said)
+        _, status, said = run("reference")
+        self.assertEqual(status, 2)
+        self.assertIn("--restart", said)
+
+    def test_no_convergence_ends_with_3_and_names_the_step(self):
+        out, status, said = run("tight", "--set", "solver.tolerance=1e-13", "--set", "solver.max_iterations=3",
+                                "--set", "control.min_step=0.05")
+        self.assertEqual(status, 3, said)
+        self.assertEqual(json.loads((out / "summary.json").read_text())["status"], "not converged")
+        self.assertIn("step 0", said)
+
+    def test_a_refused_volume_element_ends_with_4(self):
+        out, status, said = run("refused", "--set", "ve.max_unbalanced_force=1e-4", "--set", "control.min_step=0.05")
+        self.assertEqual(status, 4, said)
+        self.assertIn("unbalanced force", said)
+        self.assertEqual(json.loads((out / "summary.json").read_text())["exit_status"], 4)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
