@@ -4,6 +4,7 @@ import math
 import time
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from operator import methodcaller
 
 import numpy as np
 
@@ -15,6 +16,7 @@ import yade_modules
 from time_step import safe_time_step
 
 DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_seconds": 600.0}
+LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
 @dataclass
@@ -25,6 +27,9 @@ class _Trial:
     engine_seconds: float = 0.0
     seconds: float = 0.0
     rate: float = 0.0  # norm of the strain rate [1/s]
+    since_look: int = LOOK_EVERY  # DEM steps
+    sliding: float = 0.0  # at the last look
+    adhesive: float = 0.0
 
 
 @dataclass
@@ -36,6 +41,7 @@ class _Grains:
     solid_volume: float  # [m^3]
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
+    states: list  # YADE's objects with positions and rotations
 
 
 class Engine:
@@ -64,7 +70,8 @@ class Engine:
         self.O.dt, manifest["time_step_from"] = safe_time_step(self.O, own, spec["time_step_safety"])
         self._to_forces()
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._state_of_contacts(grains))
+        manifest.update(self._geometry(grains), **self._contact_network(grains))
+        manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
@@ -126,7 +133,10 @@ class Engine:
             step()
         self._to_forces()
         now = time.perf_counter()
-        self._trial[ve] = _Trial(steps, now - before, now - started, float(np.linalg.norm(L + L.T)) / 2)
+        trial = self._trial[ve]
+        trial.steps, trial.engine_seconds, trial.seconds = steps, now - before, now - started
+        trial.rate = float(np.linalg.norm(L + L.T)) / 2
+        trial.since_look += steps
 
     def measure(self, ve, out_stress, out_report, out_stretch):
         started = time.perf_counter()
@@ -135,12 +145,14 @@ class Engine:
         s = np.array(self._utils.getStress()).reshape(3, 3)
         out_stress[:] = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
-        values = self._state_of_contacts(grains)
-        pressure = -np.trace(s) / 3
+        values = self._contact_network(grains)
+        if trial.since_look >= LOOK_EVERY:
+            trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
+        values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
         values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         values["time_step"] = self.O.dt
-        values["inertial_number"] = trial.rate * _time_scale(grains, pressure)
-        values["mean_rotation"] = float(np.mean([b.state.rot().norm() for b in self.O.bodies]))
+        values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
+        values["mean_rotation"] = _mean_rotation(grains.states)
         values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
         values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
         for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
@@ -183,21 +195,27 @@ class Engine:
             "mean_stress": float(pressure),
         }
 
-    def _state_of_contacts(self, grains):
-        """The numbers of a report that follow from the contacts."""
-        c = contact_loop.contacts(self.O)
-        m, n = len(c.phys), grains.count
-        per_grain = np.bincount(c.ids.ravel())
-        backbone = per_grain[per_grain > 1]
+    def _contact_network(self, grains):
+        """What a report says of the contacts, as far as YADE counts it in bulk."""
+        u = self._utils
+        per_body = np.array(u.numIntrsOfEachBody())
+        backbone = per_body[per_body > 1]
+        F = np.array(u.fabricTensor()[0]).reshape(3, 3)
+        m = self.O.interactions.countReal()
         return {
             "contacts": m,
-            "coordination": 2 * m / n,
+            "coordination": 2 * m / grains.count,
             "coordination_backbone": float(backbone.mean()) if len(backbone) else 0.0,
-            "fabric": contact_loop.fabric(c, np.full(m, 1 / max(m, 1))).tolist(),
-            "sliding_contacts": float(contact_loop.at_coulomb_limit(c, grains.radius).sum()) / max(m, 1),
-            "adhesive_contacts": float(contact_loop.adhesive(c).sum()) / max(m, 1),
-            "unbalanced_force": self._utils.unbalancedForce(),
+            "fabric": [F[0, 0], F[1, 1], F[2, 2], F[0, 1], F[1, 2], F[2, 0]] if m else [0.0] * 6,
+            "unbalanced_force": u.unbalancedForce(),
         }
+
+    def _contact_states(self, grains):
+        """Sliding and adhesive contacts over all contacts."""
+        c = contact_loop.contacts(self.O)
+        m = max(len(c.phys), 1)
+        sliding = contact_loop.at_coulomb_limit(c, grains.radius).sum()
+        return float(sliding) / m, float(contact_loop.adhesive(c).sum()) / m
 
 
 def _grains(O):
@@ -206,7 +224,13 @@ def _grains(O):
     density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
     grains = [b for b in O.bodies if not b.isClumpMember]
     solid = sum(b.state.mass for b in grains) / density
-    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density)
+    states = [b.state for b in O.bodies]
+    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, states)
+
+
+def _mean_rotation(states):
+    """Mean angle [rad] that the grains have turned since the reference."""
+    return float(np.fromiter(map(methodcaller("norm"), map(methodcaller("rot"), states)), float, len(states)).mean())
 
 
 def _time_scale(grains, pressure):

@@ -5,6 +5,8 @@ import unittest
 import numpy as np
 
 import contact_loop
+from volume_element import LOOK_EVERY
+
 from cells import ADHESIVE, FIELDS, FRICTION, element, engine, measure, rate, select, template
 
 BIAXIAL = [[0.6, 0.1, 0.0], [0.1, -1.0, 0.05], [0.0, 0.05, 0.0]]
@@ -110,10 +112,10 @@ class Report(unittest.TestCase):
         self.assertLess(start["sliding_contacts"], 0.01)
         self.assertAlmostEqual(start["mean_rotation"], 0.0, delta=1e-12)
         time_scale = engine().info(ve)["time_scale"]
-        engine().deform(ve, L, 100)
+        engine().deform(ve, L, LOOK_EVERY)
         stress, r, F = measure(ve)
         self.assertTrue(np.isfinite(list(r.values())).all())
-        self.assertEqual(r["dem_steps"], 100)
+        self.assertEqual(r["dem_steps"], LOOK_EVERY)
         self.assertAlmostEqual(r["fabric_xx"] + r["fabric_yy"] + r["fabric_zz"], 1.0, delta=1e-12)
         now = 4e-3 * np.sqrt(1e5 / (-np.trace(stress) / 3))
         self.assertAlmostEqual(r["inertial_number"], now, delta=2e-3 * now)
@@ -122,7 +124,19 @@ class Report(unittest.TestCase):
         self.assertTrue(0 < r["engine_seconds"] <= r["seconds"])
         self.assertGreater(r["mean_rotation"], 1e-4)
         self.assertTrue(0 < r["sliding_contacts"] < 1 and 0.5 < r["adhesive_contacts"] <= 1)
+        per_grain = np.bincount(contact_loop.contacts(select(ve)).ids.ravel())
+        self.assertEqual(r["coordination_backbone"], per_grain[per_grain > 1].mean())
+        self.assertEqual(r["coordination"], per_grain.sum() / len(select(ve).bodies))
         self.assertAlmostEqual(time_scale, 1e-3 * np.sqrt(2600 / 1e5), delta=2e-3 * time_scale)
+
+    def test_contacts_are_looked_at_after_so_many_steps(self):
+        ve = element(FRICTION)
+        L, seen = rate(ve, 5e-3, BIAXIAL), [measure(ve)[1]["sliding_contacts"]]
+        for _ in range(4):
+            engine().deform(ve, L, LOOK_EVERY // 2)
+            seen.append(measure(ve)[1]["sliding_contacts"])
+        self.assertEqual((seen[1], seen[3]), (seen[0], seen[2]))
+        self.assertTrue(seen[2] > seen[0] + 0.05 and seen[4] != seen[2])
 
     def test_template_says_what_it_is(self):
         m = template(FRICTION)["manifest"]
