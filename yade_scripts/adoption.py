@@ -39,8 +39,8 @@ def _sort_engines(O):
             kept.append(engine)
         else:
             raise ValueError(
-                f"The YADE scene has the engine {_name(engine)}, which acts on the grains in a way that a volume element "
-                "cannot have: take it out of O.engines at the end of the script."
+                f"The YADE scene has the engine {_name(engine)}, which acts on the grains in a way that a volume "
+                "element cannot have: take it out of O.engines at the end of the script."
             )
     return kept, dropped
 
@@ -60,13 +60,13 @@ def _refuse_unsuitable(O, names):
     for needed in KEPT:
         if names.count(needed) != 1:
             raise ValueError(
-                f"The YADE scene has {names.count(needed)} engines {needed}, a volume element needs exactly one; it keeps "
-                f"{', '.join(names) or 'no engine'}."
+                f"The YADE scene has {names.count(needed)} engines {needed}, a volume element needs exactly one; it "
+                f"keeps {', '.join(names) or 'no engine'}."
             )
     if names[-1] != "NewtonIntegrator" or names.index("ForceResetter") > names.index("InteractionLoop"):
         raise ValueError(
-            f"The YADE scene runs its engines in the order {', '.join(names)}: ForceResetter must come before the contacts "
-            "and NewtonIntegrator last."
+            f"The YADE scene runs its engines in the order {', '.join(names)}: ForceResetter must come before the "
+            "contacts and NewtonIntegrator last."
         )
     for b in O.bodies:
         shape = type(b.shape).__name__

@@ -1,7 +1,6 @@
 """Volume elements made from dimensionless groups: a periodic cell of spheres under isotropic stress."""
 
 import math
-import time
 
 import numpy as np
 
@@ -33,8 +32,8 @@ MAX_STEPS = 400_000
 def prepare(O, spec):
     """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest.
 
-    Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii are
-    smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
+    Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii
+    are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
     Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
     """
     p = _checked({**DEFAULTS, **spec})
@@ -61,11 +60,12 @@ def prepare(O, spec):
 
 def _checked(p):
     if p["contact_law"] not in contact_laws.LAWS:
-        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {', '.join(contact_laws.LAWS)}.")
+        known = ", ".join(contact_laws.LAWS)
+        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {known}.")
     if p["cohesion"] > 0 and p["contact_law"] == "friction":
         raise ValueError("ve.cohesion > 0 needs ve.contact_law = \"adhesive\" or \"bonded\"; \"friction\" has none.")
     if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
-        raise ValueError("ve: spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0 are needed.")
+        raise ValueError("ve needs spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0.")
     return p
 
 

@@ -6,19 +6,21 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
 
     Engine(report_fields)              names of the entries of a report, in order (fe_master/material_points.hpp)
     versions() -> dict                 {"yade": ..., "python": ..., ...}
-    make_template(spec) -> dict        spec: the [ve] table of the case as a dict; returns {"state": bytes, "manifest": dict}.
-                                       Prepares, loads or runs the user's script; called in a process of its own.
+    make_template(spec) -> dict        spec: the [ve] table of the case as a dict; returns {"state": bytes,
+                                       "manifest": dict}. Prepares, loads or runs the user's script; called in a
+                                       process of its own.
     add(state) -> int                  new resident VE from a state; its number
     replace(ve, state)                 VE number `ve` becomes that state
     save(ve) -> bytes                  its state; add(save(ve)) continues bit-equal to replace(ve, save(ve))
     remove(ve)
     info(ve) -> dict                   {"time_step": s, "time_scale": a sqrt(rho/p) s, "volume": m^3, "spheres": n,
                                         "mean_diameter": m, "mean_stress": Pa (compression positive)}
-    deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's time_step:
-                                       the cell ends at (I + L time_step)^steps times where it was, stress and report
-                                       belong to exactly that end
+    deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's
+                                       time_step: the cell ends at (I + L time_step)^steps times where it was; stress
+                                       and report belong to exactly that end
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report; (9,) the cell's
-                                       deformation gradient from the reference (adopted) state
+                                       deformation gradient from the reference (adopted) state. sliding_contacts and
+                                       adhesive_contacts may be as old as 200 DEM steps, the rest is of now
     stiffness(ve, out_stiffness)       (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised [Pa]
 """
 

@@ -9,8 +9,8 @@ ITERATIONS = 60
 
 def safe_time_step(O, own, safety):
     """Time step [s] for the scene and where it comes from: `safety` times the critical step of the contact network; for
-    clumps and contacts without kn and ks, whose network is not known here, the smaller of the scene's `own` step [s] and
-    `safety` times YADE's estimate by P waves."""
+    clumps and contacts without kn and ks, whose network is not known here, the smaller of the scene's `own` step [s]
+    and `safety` times YADE's estimate by P waves."""
     from yade.utils import PWaveTimeStep
 
     c = contacts(O)

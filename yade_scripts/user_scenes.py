@@ -17,8 +17,8 @@ def load_scene(O, path):
         O.load(str(path))
     except Exception as error:
         raise ValueError(
-            f've.scene = "{path}" cannot be loaded ({error}): YADE\'s archives are only good for the versions of YADE and '
-            "Boost that wrote them; save the scene again with this one."
+            f've.scene = "{path}" cannot be loaded ({error}): YADE\'s archives are only good for the versions of YADE '
+            "and Boost that wrote them; save the scene again with this one."
         ) from error
 
 
@@ -26,8 +26,8 @@ def run_script(O, path, arguments, seconds):
     """Runs `path` as `yade -n path arguments...` would, in __main__ (where YADE looks for the names of hooks).
 
     Windows are not opened: yade.qt is replaced by a module that answers to any name. A simulation left running in the
-    background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. After `seconds`
-    of wall time the script is stopped where it is. Returns sentences on what was special.
+    background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. After
+    `seconds` of wall time the script is stopped where it is. Returns sentences on what was special.
     Raises ValueError when the script is missing or fails.
     """
     if not Path(path).is_file():

@@ -165,8 +165,8 @@ class Engine:
         c = contact_loop.contacts(self.O)
         if not contact_loop.has_stiffness(c):
             raise RuntimeError(
-                f"The contacts of this volume element ({type(c.phys[0]).__name__}) have no kn and ks, so Eq. (2) cannot be "
-                "formed: use a stiffness by perturbation."
+                "The contacts of this volume element have no kn and ks, so Eq. (2) cannot be formed: use a stiffness by "
+                "perturbation."
             )
         kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
         out_stiffness[:] = contact_loop.stiffness(c, kn, kt, self.O.cell.volume).ravel()

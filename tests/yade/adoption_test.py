@@ -80,7 +80,7 @@ class Script(Folder):
 
     def test_refusals(self):
         for extra, reason in (
-            ("O.engines = O.engines + [TranslationEngine(ids=[0])]", "engine TranslationEngine, which acts on the grains"),
+            ("O.engines = O.engines + [TranslationEngine(ids=[0])]", "engine TranslationEngine, which acts on"),
             ("O.engines = O.engines[:4] + O.engines[5:]", "0 engines NewtonIntegrator"),
             ("O.engines = [O.engines[4]] + O.engines[:4]", "NewtonIntegrator last"),
             ("1 / 0", "failed: ZeroDivisionError"),
@@ -144,7 +144,8 @@ class ShippedExamples(unittest.TestCase):
             here = os.getcwd()
             os.chdir(folder)
             try:
-                return engine().make_template({"source": "script", "script": str(EXAMPLES / name), "script_seconds": 20.0})
+                spec = {"source": "script", "script": str(EXAMPLES / name), "script_seconds": 20.0}
+                return engine().make_template(spec)
             finally:
                 os.chdir(here)
 

@@ -7,7 +7,7 @@ import numpy as np
 import contact_loop
 from volume_element import LOOK_EVERY
 
-from cells import ADHESIVE, FIELDS, FRICTION, element, engine, measure, rate, select, template
+from cells import ADHESIVE, FRICTION, element, engine, measure, rate, select, template
 
 BIAXIAL = [[0.6, 0.1, 0.0], [0.1, -1.0, 0.05], [0.0, 0.05, 0.0]]
 
@@ -140,7 +140,7 @@ class Report(unittest.TestCase):
 
     def test_template_says_what_it_is(self):
         m = template(FRICTION)["manifest"]
-        for key in ("porosity", "coordination", "fabric", "stress", "unbalanced_force", "spheres", "seconds", "versions"):
+        for key in "porosity coordination fabric stress unbalanced_force spheres seconds versions".split():
             self.assertIn(key, m)
         self.assertEqual(m["time_step_from"], "contact network")
 

@@ -9,7 +9,14 @@ import packing
 from cells import ADHESIVE, FRICTION, element, engine, measure, select, template
 
 BONDED = {**ADHESIVE, "contact_law": "bonded"}
-SOFT = {"spheres": 60, "kappa": 100.0, "stiffness_ratio": 2.0, "size_ratio": 3.0, "cohesion": 2.0, "confining_stress": 2e5}
+SOFT = {
+    "spheres": 60,
+    "kappa": 100.0,
+    "stiffness_ratio": 2.0,
+    "size_ratio": 3.0,
+    "cohesion": 2.0,
+    "confining_stress": 2e5,
+}
 
 
 class Equilibrium(unittest.TestCase):
