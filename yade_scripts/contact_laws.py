@@ -76,3 +76,19 @@ def add_adhesion(law, interactions, f_c, friction):
         p.cohesionBroken, p.fragile = False, law == "bonded"
         count += 1
     return count
+
+
+def sliding_without_normal_force(interactions):
+    """The adhesive contacts that pass no normal force in this step (the deviation above). Found again from the same
+    place without a slip, they would pass one; see take_normal_force."""
+    real = [i for i in interactions if hasattr(i.phys, "normalAdhesion")]
+    return [i for i in real if i.phys.normalAdhesion > 0 and i.phys.normalForce.norm() == 0.0]
+
+
+def take_normal_force(forces, interactions):
+    """Takes the normal force of `interactions` back, from the contacts and from YADE's `forces` on the grains."""
+    for i in interactions:
+        f = i.phys.normalForce
+        forces.addF(i.id1, f)
+        forces.addF(i.id2, -f)
+        i.phys.normalForce = 0 * f

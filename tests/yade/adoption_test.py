@@ -144,7 +144,7 @@ class ShippedExamples(unittest.TestCase):
             here = os.getcwd()
             os.chdir(folder)
             try:
-                spec = {"source": "script", "script": str(EXAMPLES / name), "script_seconds": 20.0}
+                spec = {"source": "script", "script": str(EXAMPLES / name), "script_seconds": 30.0}
                 return engine().make_template(spec)
             finally:
                 os.chdir(here)

@@ -75,25 +75,27 @@ class States(unittest.TestCase):
             self.assertTrue((measure(ve)[2] == measure(other)[2]).all())
 
     def test_a_restored_state_has_the_stress_and_the_forces_it_was_saved_with(self):
-        ve = element(FRICTION)
-        engine().deform(ve, rate(ve, 5e-3, BIAXIAL), 30)
-        stress, report, F = measure(ve)
-        other = engine().add(engine().save(ve))
-        again, report_again, F_again = measure(other)
-        np.testing.assert_allclose(again, stress, rtol=0, atol=1e-12 * np.abs(stress).max())
-        np.testing.assert_array_equal(F_again, F)
-        for name in ("unbalanced_force", "coordination", "sliding_contacts", "mean_rotation", "fabric_xy"):
-            self.assertAlmostEqual(report_again[name], report[name], delta=1e-9, msg=name)
+        for spec in (FRICTION, ADHESIVE):
+            ve = element(spec)
+            engine().deform(ve, rate(ve, 5e-3, BIAXIAL), LOOK_EVERY)
+            stress, report, F = measure(ve)
+            other = engine().add(engine().save(ve))
+            again, report_again, F_again = measure(other)
+            np.testing.assert_allclose(again, stress, rtol=0, atol=1e-12 * np.abs(stress).max())
+            np.testing.assert_array_equal(F_again, F)
+            for name in ("unbalanced_force", "coordination", "sliding_contacts", "mean_rotation", "fabric_xy"):
+                self.assertAlmostEqual(report_again[name], report[name], delta=1e-9, msg=name)
 
     def test_restoring_does_not_disturb_the_path(self):
-        ve = element(FRICTION)
-        L = rate(ve, 5e-3, BIAXIAL)
-        engine().deform(ve, L, 30)
-        other = engine().add(engine().save(ve))
-        for v in (ve, other):
-            engine().deform(v, L, 30)
-        a, b = measure(ve)[0], measure(other)[0]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
+        for spec in (FRICTION, ADHESIVE):
+            ve = element(spec)
+            L = rate(ve, 5e-3, BIAXIAL)
+            engine().deform(ve, L, 50)
+            other = engine().add(engine().save(ve))
+            for v in (ve, other):
+                engine().deform(v, L, 30)
+            a, b = measure(ve)[0], measure(other)[0]
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
 
     def test_a_removed_element_leaves_its_place_and_the_others_alone(self):
         keep, gone = element(FRICTION), element(FRICTION)
