@@ -207,7 +207,7 @@ void check_control(const Case& c, Mistakes& m) {
 void check_control_measure(const Case& c, const std::optional<std::set<std::string>>& edges, Mistakes& m) {
   const Keys keys = {"loads", "measure", "measure_edge"};
   if (c.control.mode == ControlMode::time) {
-    for (const char* key : {"loads", "measure", "measure_edge", "against_edge", "rate"}) {
+    for (const char* key : {"loads", "measure_edge", "against_edge", "rate"}) {
       if (m.has(fmt::format("control.{}", key)))
         m.add(fmt::format("control.{}", key),
               fmt::format("{} is of no use with control.mode = \"time\"; set mode, or remove it", key));
