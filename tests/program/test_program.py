@@ -62,10 +62,20 @@ def below(processes, ancestor):
     return mine - {ancestor}
 
 
+def is_program(pid):
+    try:
+        return os.readlink(f"/proc/{pid}/exe") == str(FEMXDEM.resolve())
+    except OSError:  # it has just ended
+        return False
+
+
 def ranks_of(mpirun):
-    """Processes of the program that this mpirun has started."""
-    children = Path(f"/proc/{mpirun.pid}/task/{mpirun.pid}/children").read_text().split()
-    return [int(pid) for pid in children if os.readlink(f"/proc/{pid}/exe") == str(FEMXDEM.resolve())]
+    """Processes of the program that this mpirun has started; none once it has ended."""
+    try:
+        children = Path(f"/proc/{mpirun.pid}/task/{mpirun.pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [int(pid) for pid in children if is_program(pid)]
 
 
 class Program(unittest.TestCase):
@@ -106,19 +116,19 @@ class Program(unittest.TestCase):
         self.assertEqual(history(out), self.reference)
 
     def test_a_killed_trial_does_not_change_the_result(self):
-        out = Path(FOLDER.name) / "killed"
-        remarks = Path(FOLDER.name) / "remarks.txt"
-        mpirun = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=open(remarks, "w"))
+        out, remarks = Path(FOLDER.name) / "killed", Path(FOLDER.name) / "remarks.txt"
+        with open(remarks, "w") as said:
+            mpirun = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=said)
         killed = 0
         while mpirun.poll() is None:
             processes = workers()
-            mine = below(processes | {r: mpirun.pid for r in ranks_of(mpirun)} if mpirun.poll() is None else {}, mpirun.pid)
+            mine = below(processes | {r: mpirun.pid for r in ranks_of(mpirun)}, mpirun.pid)
             trials = [pid for pid in mine if processes.get(pid) in processes]
             if trials and killed < 3 and (out / "history.csv").exists():
                 os.kill(trials[0], signal.SIGSEGV)
                 killed += 1
-                time.sleep(0.5)
-            time.sleep(0.01)
+                time.sleep(0.2)
+            time.sleep(0.005)
         self.assertEqual(mpirun.returncode, 0)
         self.assertGreater(killed, 0)
         self.assertIn("repeated", remarks.read_text())
