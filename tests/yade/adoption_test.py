@@ -131,7 +131,6 @@ class ShippedExamples(unittest.TestCase):
         "PeriodicBoundaries/periodic-triax.py",
         "PeriodicBoundaries/peri3dController_triaxialCompression.py",
         "FEMxDEM/prepareRVE.py",
-        "concrete/periodic.py",
     )
     REFUSED = {
         "PeriodicBoundaries/periodic-shear.py": "Body 0 of the YADE scene is a Facet",
