@@ -63,7 +63,7 @@ PatchErrors solve_patch(const Mesh& mesh, const U& u, const V& v, const BodyForc
     problem.expect_small_strain();
   } else {
     problem.parameters.tolerance = 1e-11;
-    problem.parameters.displacement_tolerance = 1e-12;
+    problem.parameters.displacement_tolerance = 1e-14;
   }
   problem.loads().body_force = b;
   for (int i = 0; i < 2; ++i) {

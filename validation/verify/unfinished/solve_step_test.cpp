@@ -13,14 +13,6 @@ namespace {
 
 constexpr double kC1111 = 1200;  // E = 1000, nu = 0.25
 const JaumannLaw kJaumann{1000, 0.25, 0};
-const DruckerPragerLaw kSoftening{.young = 1000,
-                                  .poisson = 0.25,
-                                  .cohesion = 2,
-                                  .friction_angle = 0.5,
-                                  .dilatancy_angle = 0.2,
-                                  .hardening = -10,
-                                  .residual_stress = 0.8,
-                                  .initial_pressure = 1};
 
 SolverParameters newton() {
   SolverParameters p;
@@ -47,16 +39,6 @@ struct Block {
       }
     }
     loads.prescribe(2 * edge_nodes(mesh, "bottom").front(), [](double) { return 0; });
-  }
-  void confine(double pressure) {
-    for (const char* edge : {"left", "right"}) {
-      loads.add({.edge = edge,
-                 .point = {},
-                 .kind = LoadKind::pressure,
-                 .component = Component::none,
-                 .value = pressure,
-                 .table = {}});
-    }
   }
   /// Sum of the nodal forces on the upper edge [N/m].
   double force(const NonlinearSolver& solver) const {
@@ -90,17 +72,22 @@ TEST(SolveStep, UniformStrainIsExactAtFiniteStrainOnADistortedMesh) {
   }
 }
 
-/// |r_(k+1)| <= c |r_k|^2 down to round-off, in one step to 30 %.
+/// |r_(k+1)| <= 5 |r_k|^2 down to round-off, in one step to 30 %, with the default penalty of the multiplier.
 TEST(SolveStep, NewtonIsQuadraticAtThirtyPercent) {
   for (const double D : {0.0, 20.0}) {
-    Block block(block_mesh(), kJaumann, 0.6, true, D, 1e5);
+    Block block(block_mesh(), kJaumann, 0.6, true, D);
     SolverParameters p = newton();
     p.tolerance = 1e-11;
     NonlinearSolver solver(*block.element, block.points, block.loads, p);
     const StepResult result = solver.solve_step(1);
     ASSERT_TRUE(result.converged) << result.reason;
-    for (const Iteration& i : result.table)
-      printf("D %g: residual %.2e correction %.2e gap %.2e\n", D, i.residual, i.correction, i.gap);
+    EXPECT_LE(result.iterations(), 6);
+    for (std::size_t k = 2; k < result.table.size(); ++k) {
+      EXPECT_LT(result.table[k].residual, 5 * std::pow(result.table[k - 1].residual, 2) + 1e-12) << "D = " << D;
+    }
+    double largest = 0;
+    for (const Tensor2& F : solver.committed().F) largest = std::max(largest, 1 - F(1, 1));
+    EXPECT_GT(largest, 0.3);
   }
 }
 
@@ -147,29 +134,6 @@ TEST(SolveStep, TooFewIterationsAreSaidSo) {
   EXPECT_FALSE(result.converged);
   EXPECT_FALSE(result.reason.empty());
   EXPECT_EQ(solver.committed().time, 0);
-}
-
-/// Biaxial compression past the peak: the learned tangents find what Newton's do, without a tangent of the law.
-TEST(SolveStep, LearnedTangentsFollowSoftening) {
-  std::vector<double> curve[2];
-  for (const bool learned : {false, true}) {
-    Mesh mesh = rectangle_mesh(1, 2, 2, 4);
-    Block block(mesh, kSoftening, 0.04, false, 2);
-    block.confine(1);
-    SolverParameters p = newton();
-    p.tolerance = 1e-6;
-    p.displacement_tolerance = 1e-4;
-    if (learned) p.global_operator = GlobalOperator::quasi_newton;
-    NonlinearSolver solver(*block.element, block.points, block.loads, p);
-    for (int i = 0; i < 20; ++i) {
-      const StepResult result = solver.solve_step(0.05);
-      ASSERT_TRUE(result.converged) << result.reason << " in step " << i;
-      curve[learned].push_back(block.force(solver));
-    }
-  }
-  const double peak = *std::max_element(curve[0].begin(), curve[0].end());
-  EXPECT_LT(curve[0].back(), 0.95 * peak);
-  for (int i = 0; i < 20; ++i) EXPECT_NEAR(curve[1][i], curve[0][i], 1e-4 * peak);
 }
 
 TEST(SolveStep, RestartGivesTheSameBits) {
