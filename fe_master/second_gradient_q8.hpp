@@ -63,8 +63,7 @@ class SecondGradientQ8 : public Element {
   DoubleStiffness law_;
   double penalty_;
   int unknowns_;
-  std::vector<int> corner_;   // number of a node among the corner nodes, -1 at mid-side nodes
-  std::vector<double> size_;  // square root of the reference area of an element [m]
+  std::vector<int> corner_;  // number of a node among the corner nodes, -1 at mid-side nodes
   double mean_size_ = 0;
   std::vector<Eigen::Matrix2d> F_n_;  // committed in-plane deformation gradient of the points
   std::vector<DoubleStress> sigma_;   // committed double stress of the points
