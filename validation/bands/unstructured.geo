@@ -21,7 +21,6 @@ Curve Loop(2) = {5, 6, 7, 8};
 Plane Surface(1) = {1, 2};
 Plane Surface(2) = {2};
 Recombine Surface {1, 2};
-Mesh.Algorithm = 8;
 Physical Curve("bottom") = {1};
 Physical Curve("right") = {2};
 Physical Curve("top") = {3};
