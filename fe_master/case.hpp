@@ -89,7 +89,6 @@ struct VeParameters {
   int min_steps = 10;                             ///< least DEM steps of a trial that strains
   double max_unbalanced_force = 0.2;              ///< an answer above is refused [-]
   Snapshot snapshot = Snapshot::fork;
-  double reuse_tolerance = 1e-12;            ///< largest difference of F at which points share a VE [-]
   std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
   Assignment assignment = Assignment::same;  ///< of the pool to the elements
   int assignment_seed = 1;

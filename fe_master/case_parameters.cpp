@@ -163,8 +163,6 @@ Section<VeParameters> ve_section() {
            parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
                      "an answer above is refused as unstable"),
            word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial leaves the committed state alone"),
-           parameter("reuse_tolerance", &V::reuse_tolerance, "", kNotNegative,
-                     "largest difference of F at which points share one VE"),
            parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
            word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
            parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
@@ -339,7 +337,8 @@ const CaseSections& case_sections() {
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
     s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"snapshot", "reuse_tolerance", "seeds", "assignment", "assignment_seed", "cache"});
+                            {"snapshot", "inertial_number", "min_steps", "max_unbalanced_force", "seeds", "assignment",
+                             "assignment_seed", "cache"});
     return s;
   }();
   return sections;

@@ -176,6 +176,15 @@ Mesh read_model(const std::string& file) {
   return mesh;
 }
 
+void generate(const std::string& file) {
+  constexpr double kQuadFrontal = 8;
+  double algorithm = 0;
+  gmsh::option::getNumber("Mesh.Algorithm", algorithm);
+  if (algorithm == kQuadFrontal)  // Gmsh 4.8 dies of a segmentation fault in it
+    throw UserError(fmt::format("{}: Mesh.Algorithm = 8 is not safe in Gmsh 4.8; choose 5 or 6 and recombine", file));
+  gmsh::model::mesh::generate(2);
+}
+
 }  // namespace
 
 Mesh gmsh_mesh(const std::string& file) {
@@ -189,7 +198,7 @@ Mesh gmsh_mesh(const std::string& file) {
     std::vector<int> types;
     std::vector<std::vector<std::size_t>> elements, element_nodes;
     gmsh::model::mesh::getElements(types, elements, element_nodes, 2);
-    if (types.empty() && extension == ".geo") gmsh::model::mesh::generate(2);
+    if (types.empty() && extension == ".geo") generate(file);
     return read_model(file);
   } catch (const std::string& error) {  // what Gmsh's API throws
     throw UserError(fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error));

@@ -20,6 +20,7 @@ LinearSolver::~LinearSolver() = default;
 bool LinearSolver::factorise(const SparseMatrix& A, bool symmetric) {
   Factors& f = *factors_;
   f.use_cholesky = false;
+  if (A.rows() == 0) return true;  // every unknown is prescribed
   if (symmetric) {
     if (!f.cholesky_analysed) f.cholesky.analyzePattern(A);
     f.cholesky_analysed = true;
@@ -34,6 +35,7 @@ bool LinearSolver::factorise(const SparseMatrix& A, bool symmetric) {
 }
 
 Eigen::VectorXd LinearSolver::solve(const Eigen::VectorXd& b) const {
+  if (b.size() == 0) return b;
   return factors_->use_cholesky ? Eigen::VectorXd(factors_->cholesky.solve(b)) : Eigen::VectorXd(factors_->lu.solve(b));
 }
 

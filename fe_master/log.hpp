@@ -19,8 +19,8 @@ struct IterationRecord {
   double correction = 0;        ///< |du| / |u| [-]
   double dem_seconds_max = 0;   ///< of the slowest point [s]
   double dem_seconds_mean = 0;  ///< over the points [s]
-  double assembly_seconds = 0;
-  double solve_seconds = 0;
+  double solve_seconds = 0;     ///< assembly and solution
+  int element = 0;              ///< farthest out of balance
   std::string note;  ///< such as "cut" or the point that failed; mostly empty
 };
 

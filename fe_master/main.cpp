@@ -17,6 +17,9 @@
 #include "versions.hpp"
 #include "volume_elements.hpp"
 
+/// Of OpenBLAS, where that is the BLAS that SuiteSparse runs on.
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+
 namespace femxdem {
 namespace {
 
@@ -138,8 +141,7 @@ int check(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace femxdem;
-  setenv("OPENBLAS_NUM_THREADS", "1", 0);  // the ranks are the parallelism
-  setenv("OMP_NUM_THREADS", "1", 0);
+  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
   Arguments arguments;
   for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
 

@@ -17,6 +17,7 @@
 #include "results.hpp"
 #include "second_gradient_q8.hpp"
 #include "solve_step.hpp"
+#include "warnings.hpp"
 
 namespace femxdem {
 namespace {
@@ -36,6 +37,7 @@ class Run {
   void write_fields();
   void write_state();
   void finish(int status, const std::string& message);
+  std::string place(std::size_t point) const;
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   const Case& case_;
@@ -104,6 +106,7 @@ int Run::go() {
   log_.say(fmt::format("{}: {} elements, {} material points, {} unknowns, {} rank{}", case_.file,
                        element_->mesh().elements.size(), points_.size(), element_->unknowns(), options_.ranks,
                        options_.ranks > 1 ? "s" : ""));
+  for (const std::string& warning : warnings(case_, element_->mesh())) log_.say("warning: " + warning);
   before_ = solver_.committed();
   if (options_.existing == Existing::resume) {
     restart();
@@ -151,7 +154,7 @@ bool Run::step() {
     record_.dem_seconds += i.engine_seconds;
     summary_.evaluate_seconds += i.evaluate_seconds;
     table.push_back({static_cast<int>(table.size()) + 1, i.residual, i.correction, i.longest_point,
-                     i.engine_seconds / static_cast<double>(points_.size()), 0, i.solve_seconds, i.note});
+                     i.engine_seconds / static_cast<double>(points_.size()), i.solve_seconds, i.element, i.note});
   }
   if (!last_.converged) {
     const bool passes_on = control_.rejected();
@@ -161,9 +164,10 @@ bool Run::step() {
                                                             : fmt::format("; again with a step of {:.3g}", dt_);
     log_.say(fmt::format("step {} to time {:.6g} rejected: {}{}", summary_.steps + 1, time + dt, last_.reason, next));
     for (const IterationRecord& i : table) {
-      log_.note(fmt::format("  {:3} |r|/|f| {:.2e} |du|/|u| {:.2e} {}", i.iteration, i.residual, i.correction, i.note));
+      log_.note(fmt::format("  {:3} |r|/|f| {:.2e} |du|/|u| {:.2e} element {} {}", i.iteration, i.residual,
+                            i.correction, i.element, i.note));
     }
-    if (last_.failure) log_.say(fmt::format("  {}", last_.failure->advice));
+    if (last_.failure) log_.say(fmt::format("  {}: {}", place(last_.failure->point), last_.failure->advice));
     return false;
   }
   if (control_.accepted(start, solver_.committed()))
@@ -194,6 +198,12 @@ bool Run::step() {
   return true;
 }
 
+std::string Run::place(std::size_t point) const {
+  const Point2& X = element_->shapes(point).X;
+  return fmt::format("material point {} (element {}, at {:.4g}, {:.4g} m)", point, point / kPointsPerElement, X.x(),
+                     X.y());
+}
+
 void Run::write_fields() {
   const Equilibrium& now = solver_.committed();
   const Mesh& mesh = element_->mesh();
@@ -208,6 +218,10 @@ void Run::write_fields() {
       summary_.steps, now.time, now.time / case_.control.end_time, {}, point_fields(now.F, stress, reports)};
   fields.point_fields.push_back(second_order_work(before_.F, stress_before, now.F, stress));
   fields.point_fields.push_back({"least_tangent_eigenvalue", 1, solver_.operators().least_eigenvalues()});
+  Field element_residual{"element_residual", 1, {}};
+  for (const double value : solver_.element_residuals(now))
+    element_residual.values.insert(element_residual.values.end(), kPointsPerElement, value);
+  fields.point_fields.push_back(std::move(element_residual));
   Field displacement{"displacement", 2, {}};
   Field residual{"residual", 2, {}};
   Eigen::VectorXd out_of_balance = now.external - now.internal;

@@ -26,6 +26,10 @@ std::vector<Tensor2> stresses(const std::vector<Response>& responses) {
   return values;
 }
 
+int largest(const std::vector<double>& values) {
+  return static_cast<int>(std::max_element(values.begin(), values.end()) - values.begin());
+}
+
 std::vector<Response> undeformed(MaterialPoints& points, std::span<const Tensor2> F) {
   points.begin_step();
   std::vector<Response> responses = points.evaluate(F, Operator::elastic);
@@ -70,6 +74,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
     Iteration& now = result.table.emplace_back();
     if (!evaluate(trial, result)) return result;
     now.residual = relative_residual(trial);
+    now.element = largest(element_residuals(trial));
     history.add(now.residual);
     if (result.reason = history.hopeless(operators_.memoryless()); !result.reason.empty()) break;
     if (now.residual > parameters_.tolerance && search.rejects(now.residual)) {
@@ -262,13 +267,28 @@ AndersonAcceleration NonlinearSolver::acceleration() const {
   return {depth, parameters_.anderson_truncation, std::move(weights)};
 }
 
-double NonlinearSolver::relative_residual(const Equilibrium& state) const {
-  double free = 0, reactions = 0;
-  const Eigen::VectorXd out_of_balance = state.external - state.internal;
-  for (const int i : assembler_.free()) free += std::pow(out_of_balance[i] / element_.residual_length(i), 2);
-  for (const int i : prescribed_) reactions += std::pow(out_of_balance[i] / element_.residual_length(i), 2);
+/// Out-of-balance forces of all unknowns as forces, over the norm of the reactions and external forces; 0 where
+/// prescribed.
+Eigen::VectorXd NonlinearSolver::scaled_residual(const Equilibrium& state) const {
+  Eigen::VectorXd residual = state.external - state.internal;
+  for (Eigen::Index i = 0; i < residual.size(); ++i) residual[i] /= element_.residual_length(static_cast<int>(i));
+  double reactions = 0;
+  for (const int i : prescribed_) {
+    reactions += residual[i] * residual[i];
+    residual[i] = 0;
+  }
   const double scale = std::max(std::sqrt(reactions), state.external.norm());
-  return scale > 0 ? std::sqrt(free) / scale : std::sqrt(free);
+  return scale > 0 ? Eigen::VectorXd(residual / scale) : residual;
+}
+
+double NonlinearSolver::relative_residual(const Equilibrium& state) const { return scaled_residual(state).norm(); }
+
+std::vector<double> NonlinearSolver::element_residuals(const Equilibrium& state) const {
+  const Eigen::VectorXd residual = scaled_residual(state);
+  std::vector<double> norms;
+  for (std::size_t e = 0; e < element_.mesh().elements.size(); ++e)
+    norms.push_back(residual(element_.dofs(static_cast<int>(e))).norm());
+  return norms;
 }
 
 bool NonlinearSolver::converged(const Iteration& iteration) const {

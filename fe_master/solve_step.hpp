@@ -21,6 +21,7 @@ struct Iteration {
   double residual = 0;    ///< free forces over reactions and external forces [-]
   double correction = 0;  ///< displacement correction over the step's displacement [-]
   double gap = 0;         ///< constraints: second gradient over the step's micro gradient, measure over its change [-]
+  int element = 0;        ///< whose nodes are farthest out of balance
   double engine_seconds = 0;    ///< inside the DEM engine, all points [s]
   double longest_point = 0;     ///< the busiest point [s]
   double evaluate_seconds = 0;  ///< wall time of the evaluation [s]
@@ -69,6 +70,8 @@ class NonlinearSolver {
   const PointOperators& operators() const { return operators_; }
   /// Out-of-balance force of a state over its reactions and external forces [-].
   double relative_residual(const Equilibrium& state) const;
+  /// The same of the nodes of each element.
+  std::vector<double> element_residuals(const Equilibrium& state) const;
 
   void save(NamedArrays& arrays) const;
   /// Goes on from saved arrays; the points must have been loaded before.
@@ -94,6 +97,7 @@ class NonlinearSolver {
   bool converged(const Iteration& iteration) const;
   bool accept_best(Equilibrium& best, StepResult& result);
   void commit(Equilibrium& trial, double dt);
+  Eigen::VectorXd scaled_residual(const Equilibrium& state) const;
 
   Element& element_;
   MaterialPoints& points_;

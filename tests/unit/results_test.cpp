@@ -217,7 +217,7 @@ TEST_F(ResultsTest, BatchLogGetsPlainLinesAndTheFileTheTable) {
   {
     Log log(folder_ / "log.txt", Existing::refuse, batch);
     log.say("mesh: 128 elements");
-    const std::vector<IterationRecord> iterations = {{1, 0.25, 0.5, 1, 0.5, 0.1, 0.2, "cut"}};
+    const std::vector<IterationRecord> iterations = {{1, 0.25, 0.5, 1, 0.5, 0.2, 7, "cut"}};
     log.step(record(3), iterations, 1.0);
   }
   std::fclose(batch);
