@@ -99,9 +99,10 @@ void print_snapshot_costs(WorkerProcess& worker, const Settings& settings) {
   const std::string state = packing(forked, settings);
   forked.add(state, settings.points);
   saved.add(state, settings.points);
-  fmt::print("{} volume elements of {} spheres; processor time [ms] of a volume element and trial of {} DEM steps, "
-             "medians of {}\n",
-             settings.points, settings.spheres, settings.steps, settings.repetitions);
+  fmt::print(
+      "{} volume elements of {} spheres; processor time [ms] of a volume element and trial of {} DEM steps, "
+      "medians of {}\n",
+      settings.points, settings.spheres, settings.steps, settings.repetitions);
   for (const bool commit : {false, true}) {
     std::vector<double> forking, saving;
     for (int trial = 0; trial < settings.repetitions; ++trial) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "localisation.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -19,6 +21,7 @@ PointOperators::PointOperators(const SolverParameters& parameters, std::span<con
   const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, parameters.qn_noise};
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
+    elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));
     learned_.emplace_back(r.stiffness, kPlaneStrain, limits);
   }
 }
@@ -86,6 +89,16 @@ std::vector<Tensor4> PointOperators::piola(std::span<const Tensor2> F, std::span
     }
   }
   return dPdF;
+}
+
+std::vector<double> PointOperators::acoustic_determinants(std::span<const Tensor2> F,
+                                                          std::span<const Response> responses) const {
+  std::vector<double> ratios;
+  if (symmetric()) return ratios;
+  const std::vector<Tensor4> dPdF = piola(F, responses);  // N . dP/dF . N has the sign of the spatial one: N ~ F^T n
+  for (std::size_t p = 0; p < dPdF.size(); ++p)
+    ratios.push_back(min_acoustic_determinant(dPdF[p]) / elastic_acoustic_determinants_[p]);
+  return ratios;
 }
 
 std::vector<double> PointOperators::least_eigenvalues() const {

@@ -38,6 +38,9 @@ class PointOperators {
   int probe(MaterialPoints& points, std::span<const Tensor2> F, std::span<const Response> responses);
   /// dP/dF of all points at a trial [Pa].
   std::vector<Tensor4> piola(std::span<const Tensor2> F, std::span<const Response> responses) const;
+  /// Smallest determinant of each point's acoustic tensor over that of its undeformed elasticity [-]: a band can form
+  /// where it is not positive (Rice, 1976). Empty with the elastic operator, which knows no tangent.
+  std::vector<double> acoustic_determinants(std::span<const Tensor2> F, std::span<const Response> responses) const;
   /// Smallest eigenvalue of the symmetric part of each learned tangent in the elastic metric [-]; 1 without learning.
   std::vector<double> least_eigenvalues() const;
 
@@ -46,8 +49,9 @@ class PointOperators {
 
  private:
   SolverParameters parameters_;
-  std::vector<Tensor4> elastic_;         // in use by the elastic operator
-  std::vector<LearnedTangent> learned_;  // quasi_newton and perturbation
+  std::vector<Tensor4> elastic_;                       // in use by the elastic operator
+  std::vector<double> elastic_acoustic_determinants_;  // undeformed [Pa^2]
+  std::vector<LearnedTangent> learned_;                // quasi_newton and perturbation
   std::vector<Tensor2> F_n_;
 };
 

@@ -218,6 +218,8 @@ void Run::write_fields() {
       summary_.steps, now.time, now.time / case_.control.end_time, {}, point_fields(now.F, stress, reports)};
   fields.point_fields.push_back(second_order_work(before_.F, stress_before, now.F, stress));
   fields.point_fields.push_back({"least_tangent_eigenvalue", 1, solver_.operators().least_eigenvalues()});
+  if (auto values = solver_.operators().acoustic_determinants(now.F, now.responses); !values.empty())
+    fields.point_fields.push_back({"acoustic_determinant", 1, std::move(values)});
   Field element_residual{"element_residual", 1, {}};
   for (const double value : solver_.element_residuals(now))
     element_residual.values.insert(element_residual.values.end(), kPointsPerElement, value);

@@ -6,6 +6,8 @@
 #include <numbers>
 
 #include "analytic_laws.hpp"
+#include "analytic_points.hpp"
+#include "global_operator.hpp"
 
 namespace femxdem {
 namespace {
@@ -78,6 +80,27 @@ TEST(Localisation, VonMisesSofteningLocalisesAlongItsPlanesOfShear) {
   EXPECT_NEAR(angle, 45 * kDegree, 0.6 * kDegree);
   law.hardening = 400;
   EXPECT_GT(determinant(law, 1e-2, &angle), 0);
+}
+
+TEST(Localisation, OperatorsTellItOfTheirTangents) {
+  AnalyticPoints points(
+      {VonMisesLaw{.young = 1000, .poisson = 0.25, .yield_stress = 6, .hardening = -40, .residual_stress = 2}});
+  const std::vector<Tensor2> start = {Tensor2::Identity()};
+  const std::vector<Response> reference = points.evaluate(start, Operator::elastic);
+  SolverParameters parameters;
+  parameters.global_operator = GlobalOperator::quasi_newton;
+  PointOperators learned(parameters, reference);
+  EXPECT_NEAR(learned.acoustic_determinants(start, reference).at(0), 1, 1e-12);
+  parameters.global_operator = GlobalOperator::tangent;
+  const PointOperators consistent(parameters, reference);
+  const std::vector<Tensor2> F = {Tensor2(Eigen::Vector3d(1.01, 0.99, 1).asDiagonal())};
+  const std::vector<Response> answer = points.evaluate(F, Operator::tangent);
+  EXPECT_LT(consistent.acoustic_determinants(F, answer).at(0), 0);
+  learned.begin_step(start, reference);
+  learned.learn(F, answer);  // bounded from below: nearly singular at most
+  EXPECT_LT(learned.acoustic_determinants(F, answer).at(0), 0.5);
+  parameters.global_operator = GlobalOperator::elastic;
+  EXPECT_TRUE(PointOperators(parameters, reference).acoustic_determinants(F, answer).empty());
 }
 
 }  // namespace

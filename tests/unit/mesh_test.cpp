@@ -244,6 +244,9 @@ TEST(GmshMesh, WrongFilesAreRefusedWithTheReason) {
   const std::string garbage = (std::filesystem::path(testing::TempDir()) / "garbage.msh").string();
   std::ofstream(garbage) << "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\nnone\n";
   EXPECT_NE(sentence(garbage).find("Gmsh cannot read it (Could not read nodes)"), std::string::npos);
+  const std::string crashes = (std::filesystem::path(testing::TempDir()) / "crashes.geo").string();
+  std::ofstream(crashes) << "Mesh.Algorithm = 8;\nMerge \"" << data("square.geo") << "\";\n";
+  EXPECT_NE(sentence(crashes).find("Mesh.Algorithm = 8 is not safe"), std::string::npos);
 }
 
 }  // namespace
