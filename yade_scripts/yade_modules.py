@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 DEFAULT_DIR = "/usr/lib/x86_64-linux-gnu/yade-double/py"
@@ -31,13 +32,30 @@ def load():
         del os.environ[name]
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
-    import yade  # registers the C++ classes
+    with _silence():
+        import yade  # registers the C++ classes
 
-    import yade._utils
-    import yade.utils
-    import yade.wrapper
+        import yade._utils
+        import yade.utils
+        import yade.wrapper
 
     return yade.wrapper.Omega()
+
+
+@contextmanager
+def _silence():
+    """YADE's import writes to the standard output, past Python: every worker would say it."""
+    sys.stdout.flush()
+    out = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    try:
+        yield
+        sys.stdout.flush()
+    finally:
+        os.dup2(out, 1)
+        os.close(out)
+        os.close(nowhere)
 
 
 def versions():
