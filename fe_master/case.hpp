@@ -64,7 +64,9 @@ struct RegionMaterial {
 
 enum class VeSource { prepare, scene, script };
 enum class ContactLaw { adhesive, bonded, friction };
+enum class NewContacts { frictional, adhesive };
 enum class Snapshot { fork, serialise };
+enum class VeStiffness { affine, relaxed };
 enum class Assignment { same, random };
 struct VeParameters {
   VeSource source = VeSource::prepare;
@@ -88,6 +90,8 @@ struct VeParameters {
   double time_step_safety = 0.8;                  ///< DEM time step / critical one [-]
   int min_steps = 10;                             ///< least DEM steps of a trial that strains
   double max_unbalanced_force = 0.2;              ///< an answer above is refused [-]
+  NewContacts new_contacts = NewContacts::frictional;
+  VeStiffness stiffness = VeStiffness::affine;
   Snapshot snapshot = Snapshot::fork;
   std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
   Assignment assignment = Assignment::same;  ///< of the pool to the elements

@@ -176,6 +176,9 @@ void check_one_ve(const VeParameters& ve, const std::string& key, Mistakes& m) {
   if (ve.contact_law == ContactLaw::friction && ve.cohesion > 0.0)
     m.add(key + ".cohesion",
           "ve.cohesion > 0 needs contact_law = \"adhesive\" or \"bonded\"; set one, or cohesion = 0");
+  if (ve.new_contacts == NewContacts::adhesive && (ve.contact_law != ContactLaw::adhesive || !(ve.cohesion > 0.0)))
+    m.add(key + ".new_contacts",
+          "ve.new_contacts = \"adhesive\" needs contact_law = \"adhesive\" and cohesion > 0; set both or remove it");
 }
 
 void check_ve(const Case& c, Mistakes& m) {

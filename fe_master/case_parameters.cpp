@@ -150,6 +150,8 @@ Section<VeParameters> ve_section() {
            parameter("cohesion", &V::cohesion, "", kNotNegative, "p* = f_c / (sigma_0 a^2)"),
            word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction"},
                 "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none"),
+           word("new_contacts", &V::new_contacts, {"frictional", "adhesive"},
+                "contacts that form after the preparation: without adhesion, or adhesive as the others"),
            parameter("compaction_friction", &V::compaction_friction, "", {0.0, 10.0},
                      "mu while the packing is made: 0 is the densest"),
            parameter("confining_stress", &V::confining_stress, "Pa", kPositive, "sigma_0, compression positive"),
@@ -162,6 +164,8 @@ Section<VeParameters> ve_section() {
            parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
            parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
                      "an answer above is refused as unstable"),
+           word("stiffness", &V::stiffness, {"affine", "relaxed"},
+                "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium"),
            word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial leaves the committed state alone"),
            parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
            word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
@@ -337,8 +341,8 @@ const CaseSections& case_sections() {
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
     s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"snapshot", "inertial_number", "min_steps", "max_unbalanced_force", "seeds", "assignment",
-                             "assignment_seed", "cache"});
+                            {"stiffness", "snapshot", "inertial_number", "min_steps", "max_unbalanced_force", "seeds",
+                             "assignment", "assignment_seed", "cache"});
     return s;
   }();
   return sections;

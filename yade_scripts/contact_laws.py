@@ -10,12 +10,16 @@ delta is the overlap, forces are compression positive; mu is the friction, f_c t
             and the contact is one of friction.
 "friction"  f_n = kn delta, |f_t| <= mu f_n: cheaper, no adhesion.
 
-Contacts that form later have no adhesion, in all three.
+Contacts that form later have no adhesion, in all three; the adhesive law can give it to them too, see
+make_new_contacts_adhesive.
 """
 
 import math
 
 LAWS = ("adhesive", "bonded", "friction")
+NEW_CONTACTS = ("frictional", "adhesive")
+EVERY = 4  # DEM steps between two looks for new contacts
+TAG = "femxdem_adhesion_of_new_contacts"
 
 
 def engines(law, kn, kt, damping):
@@ -76,6 +80,27 @@ def add_adhesion(law, interactions, f_c, friction):
         p.cohesionBroken, p.fragile = False, law == "bonded"
         count += 1
     return count
+
+
+def make_new_contacts_adhesive(O, f_c, friction):
+    """Notes in the scene, with which it is saved, that contacts formed from now on get the adhesion f_c [N]."""
+    O.tags[TAG] = f"{f_c!r} {friction!r}"
+
+
+def adhesion_of_new_contacts(O):
+    """(f_c [N], friction) of the scene's note, or None."""
+    return tuple(map(float, O.tags[TAG].split())) if TAG in O.tags.keys() else None
+
+
+def run(O, steps, new_adhesion):
+    """`steps` DEM steps. With new_adhesion = (f_c, friction), contacts that formed since become adhesive at every step
+    number divisible by EVERY: by the scene's own count, so that no split and no restart moves it."""
+    step = O.step
+    for _ in range(steps):
+        step()
+        if new_adhesion and O.iter % EVERY == 0:
+            since = O.iter - 2 * EVERY
+            add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal > since], *new_adhesion)
 
 
 def sliding_without_normal_force(interactions):

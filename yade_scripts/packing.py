@@ -15,6 +15,7 @@ DEFAULTS = {
     "compaction_friction": 0.0,  # friction while the packing is made: 0 is the densest
     "cohesion": 0.0,  # p* = f_c/(sigma_0 a^2)
     "contact_law": "adhesive",
+    "new_contacts": "frictional",  # contacts that form after the preparation
     "confining_stress": 1e5,  # sigma_0 [Pa]
     "mean_diameter": 1e-3,  # a [m]
     "density": 2600.0,  # of the grains [kg/m^3]
@@ -55,6 +56,8 @@ def prepare(O, spec):
         while contact_laws.add_adhesion(law, O.interactions, f_c, p["friction"]):
             servo.settle(ROUGH)
     servo.settle()
+    if p["new_contacts"] == "adhesive":
+        contact_laws.make_new_contacts_adhesive(O, f_c, p["friction"])
     O.engines[-1].damping = p["damping"]
 
 
@@ -64,6 +67,11 @@ def _checked(p):
         raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {known}.")
     if p["cohesion"] > 0 and p["contact_law"] == "friction":
         raise ValueError("ve.cohesion > 0 needs ve.contact_law = \"adhesive\" or \"bonded\"; \"friction\" has none.")
+    if p["new_contacts"] not in contact_laws.NEW_CONTACTS:
+        known = ", ".join(contact_laws.NEW_CONTACTS)
+        raise ValueError(f"ve.new_contacts = \"{p['new_contacts']}\" is unknown: use one of {known}.")
+    if p["new_contacts"] == "adhesive" and not (p["contact_law"] == "adhesive" and p["cohesion"] > 0):
+        raise ValueError('ve.new_contacts = "adhesive" needs ve.contact_law = "adhesive" and ve.cohesion > 0.')
     if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
         raise ValueError("ve needs spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0.")
     return p

@@ -43,6 +43,7 @@ class _Grains:
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
     states: list  # YADE's objects with positions and rotations
+    new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
 
 
 class Engine:
@@ -128,12 +129,10 @@ class Engine:
     def deform(self, ve, velocity_gradient, steps):
         self._select(ve)
         L = np.asarray(velocity_gradient, dtype=float).reshape(3, 3)
-        step = self.O.step
         started = time.perf_counter()
         self.O.cell.velGrad = self._Matrix3(*L.ravel())
         before = time.perf_counter()
-        for _ in range(steps):
-            step()
+        contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
         self._to_forces()
         now = time.perf_counter()
         trial = self._trial[ve]
@@ -228,7 +227,8 @@ def _grains(O):
     grains = [b for b in O.bodies if not b.isClumpMember]
     solid = sum(b.state.mass for b in grains) / density
     states = [b.state for b in O.bodies]
-    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, states)
+    new_adhesion = contact_laws.adhesion_of_new_contacts(O)
+    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, states, new_adhesion)
 
 
 def _mean_rotation(states):

@@ -251,6 +251,7 @@ TEST(VePool, SpecIsJsonOfOneVolumeElement) {
   EXPECT_EQ(json.front(), '{');
   EXPECT_NE(json.find("\"seed\": 7,"), std::string::npos);
   EXPECT_NE(json.find("\"contact_law\": \"adhesive\""), std::string::npos);
+  EXPECT_NE(json.find("\"new_contacts\": \"frictional\""), std::string::npos);
   EXPECT_NE(json.find("\"confining_stress\": 100000.0"), std::string::npos);
   EXPECT_NE(json.find("\"arguments\": [\"--wet\", \"a \\\"b\\\"\"]"), std::string::npos);
   EXPECT_EQ(json.find("seeds"), std::string::npos);

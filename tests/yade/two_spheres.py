@@ -9,12 +9,16 @@ DIAMETER = 1.0  # [m]; far above the overlaps, so that the contact hardly turns 
 KN = 5e4  # [N/m]
 F_C = 0.1  # [N]
 FRICTION = 0.5
+STEP = 1e-7  # [m], a twentieth of f_c/kn
 
 
 class Pair:
-    """A fixed sphere and one at x = DIAMETER - overlap that goes where it is told; `law` as in contact_laws.LAWS."""
+    """A fixed sphere and one at x = DIAMETER - overlap that goes where it is told; `law` as in contact_laws.LAWS.
 
-    def __init__(self, law, overlap, kt=KN):
+    new_adhesion: None or (f_c [N], friction) of contacts that form later, see contact_laws.run.
+    """
+
+    def __init__(self, law, overlap, kt=KN, new_adhesion=None):
         O = engine().O
         from yade.utils import Matrix3, Vector3, sphere
 
@@ -28,7 +32,7 @@ class Pair:
         for x in (0.0, DIAMETER - overlap):
             O.bodies.append(sphere((x, 0, 0), DIAMETER / 2, material=mat))
             O.bodies[-1].state.blockedDOFs = "xyzXYZ"
-        self.O, self.moving, self._vector = O, O.bodies[1], Vector3
+        self.O, self.moving, self._vector, self._new_adhesion = O, O.bodies[1], Vector3, new_adhesion
         self._find_forces()
         if law != "friction" and self.contact:
             contact_laws.add_adhesion(law, O.interactions, F_C, FRICTION)
@@ -43,7 +47,7 @@ class Pair:
     def move(self, dx, dy):
         """The sphere goes `dx`, `dy` [m] further and the forces there are found (the pair rests inside a step)."""
         self.moving.state.vel = self._vector(dx, dy, 0) / self.O.dt
-        self.O.step()
+        contact_laws.run(self.O, 1, self._new_adhesion)
         self._find_forces()
 
     def _find_forces(self):
@@ -66,3 +70,42 @@ class Pair:
     def shear_force(self):
         i = self.contact
         return i.phys.shearForce.norm() if i else 0.0
+
+
+def normal_path(law, path, overlap=4e-6, new_adhesion=None):
+    """Rows (overlap, normal force, contact?) along `path`, increments of the overlap in STEPs."""
+    pair, rows = Pair(law, overlap, new_adhesion=new_adhesion), []
+    for direction in path:
+        pair.move(-direction * STEP, 0)
+        rows.append((pair.overlap, pair.normal_force, pair.contact is not None))
+    return np.array(rows)
+
+
+def there_and_back(steps):
+    return [-1] * steps + [1] * steps
+
+
+def slide(law, overlap, path, kt=KN):
+    """Rows (overlap, normal force, shear force) along `path`, tangential increments in STEPs, and the pair."""
+    pair, rows = Pair(law, overlap, kt), []
+    for direction in path:
+        pair.move(0, direction * STEP)
+        rows.append((pair.overlap, pair.normal_force, pair.shear_force))
+    return np.array(rows), pair
+
+
+def sliding_cycle(slip):
+    """Path of slide: over `slip` [m] forth, twice back, forth."""
+    n = int(slip / STEP)
+    return [1] * n + [-1] * 2 * n + [1] * n
+
+
+def slider(overlaps, path, limit, kt=KN):
+    """Closed form (signed) of the shear force along `path`: elastic-plastic in the tangential slip s (which YADE takes at
+    touching spheres, s d/(d - delta)): trial kt s, cut at the `limit` of the current overlap."""
+    force, forces = 0.0, []
+    for most, overlap, direction in zip(limit, overlaps, path):
+        trial = force + kt * direction * STEP * DIAMETER / (DIAMETER - overlap)
+        force = min(max(trial, -most), most)
+        forces.append(force)
+    return np.array(forces)
