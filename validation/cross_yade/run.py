@@ -3,7 +3,8 @@
 
     validation/cross_yade/run.py [--femxdem PROGRAM] [--out FOLDER] [--spheres N] [--seeds 1 2 3] [--paths NAME ...]
 
-Writes FOLDER/table.csv, table.md and cross_yade.png; curves that are there already are not computed again.
+Writes FOLDER/table.csv, table.md and cross_yade.png after every row (a law on a path, all seeds), those of the paper's
+case first; curves that are there already are not computed again.
 """
 
 import argparse
@@ -188,6 +189,13 @@ def draw(folder, results):
     figure.savefig(folder / "cross_yade.png", dpi=90)
 
 
+def rows_in_order(laws, paths):
+    """(law, path) pairs: what the paper does first, so that a campaign that is cut short still says something."""
+    first = [p for p in ("biaxial", "triaxial_compression") if p in paths]
+    rest = [p for p in paths if p not in first]
+    return [(law, path) for group in (first, rest) for law in laws for path in group]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
@@ -199,15 +207,14 @@ def main():
     a = parser.parse_args()
     program, folder = Path(a.femxdem).resolve(), a.out.resolve()
     results = {}
-    for seed in a.seeds:
-        for law in a.laws:
-            for name in a.paths:
-                case = compute(program, folder, law, seed, PATHS[name], a.spheres)
-                curves = {series: curve(folder, case, series, PATHS[name]) for series in SERIES}
-                results.setdefault((law, name), {})[seed] = curves
-                print(law, seed, name, " ".join(f"{x:.2e}" for x in table_row(curves)), flush=True)
-    write_tables(folder, results)
-    draw(folder, results)
+    for law, name in rows_in_order(a.laws, a.paths):
+        for seed in a.seeds:
+            case = compute(program, folder, law, seed, PATHS[name], a.spheres)
+            curves = {series: curve(folder, case, series, PATHS[name]) for series in SERIES}
+            results.setdefault((law, name), {})[seed] = curves
+            print(law, seed, name, " ".join(f"{x:.2e}" for x in table_row(curves)), flush=True)
+        write_tables(folder, results)
+        draw(folder, results)
     print((folder / "table.md").read_text())
 
 
