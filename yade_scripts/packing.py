@@ -45,7 +45,8 @@ def prepare(O, spec):
     radii = 0.5 * a * diameters / diameters.mean()
     shrink = 0.5 * f_c / kn if law == "adhesive" else 0.0
     _loose_cell(O, p, kn, radii, radii - shrink, rng)
-    O.dt = 0.2 * math.sqrt(O.bodies[int(np.argmin(radii))].state.mass / kn)
+    stiffest = kn * max(1, 1 / p["stiffness_ratio"])  # of normal and tangential
+    O.dt = 0.2 * math.sqrt(O.bodies[int(np.argmin(radii))].state.mass / stiffest)
     servo = _Servo(O, p, kn)
     servo.compact()
     servo.settle(ROUGH, servo.steps + int(ROUGH_STEPS * math.sqrt(p["kappa"] / 500)))
@@ -126,7 +127,8 @@ class _Servo:
 
         self.O, self.sigma = O, p["confining_stress"]
         self.stress, self.unbalanced = getStress, unbalancedForce
-        self.bulk_modulus = 0.4 * kn / p["mean_diameter"]  # of a dense packing
+        shear = max(1, (1 + 1.5 / p["stiffness_ratio"]) / 2.5)  # shear modulus over that of k_n/k_t = 1, Voigt
+        self.modulus = 0.4 * kn / p["mean_diameter"] * shear  # of a dense packing: bulk, or more where shear is stiffer
         self.relaxation = 50 * O.dt
         self.rate = 0.02 * math.sqrt(self.sigma / p["density"]) / p["mean_diameter"]  # inertial number 0.02
         self.steps = 0
@@ -163,6 +165,6 @@ class _Servo:
                 if self.unbalanced() < slack * UNBALANCED_TOLERANCE:
                     break
                 e[:] = 0
-            rate = -e * self.sigma / (self.bulk_modulus * self.relaxation)
+            rate = -e * self.sigma / (self.modulus * self.relaxation)
             self._strain(np.clip(rate, -self.rate, self.rate))
         self._strain(np.zeros((3, 3)))

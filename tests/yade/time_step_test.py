@@ -11,6 +11,7 @@ CELLS = (
     {"spheres": 60, "contact_law": "friction"},
     {"spheres": 60, "contact_law": "friction", "kappa": 100.0, "stiffness_ratio": 0.5},
     {"spheres": 60, "contact_law": "friction", "kappa": 5000.0, "stiffness_ratio": 5.0},
+    {"spheres": 60, "contact_law": "friction", "kappa": 100.0, "stiffness_ratio": 0.2, "size_ratio": 1.0},
 )
 
 
