@@ -6,6 +6,10 @@ import numpy as np
 
 from program import Row
 
+import band
+import results
+
+WEAK = ('region=[{name="weak",box=[0.33,0.83,0.51,1.01]}]', 'material.region=[{region="weak",cohesion=0.9e5}]', "control.end_time=0.6")
 BAR_FORCE = 0.994091678  # closed form (validation/bilinear_bar), A1 e_l = 1
 BAR = ("solver.qn_noise=1e-12", "control.step=0.04")  # strains of 1e-5; four points of the path before the peak
 
@@ -70,5 +74,128 @@ def large_increments(program):
                 "with cutting it recovers": cut.status == 0 and cut.rejected() > 0 and math.isclose(cut.history()["time"][-1], 0.4)})
 
 
+def invariant(run):
+    """|dev ln U| of all points at the end."""
+    return results.read_step(run.folder).fields["strain_invariant"]
+
+
+def first_gradient(program):
+    """Past localisation the band of the first gradient is as thick as an element."""
+    meshes, thickness, force = {"6 x 12": (6, 12), "12 x 24": (12, 24)}, {}, {}
+    for element in ("q8", "second_gradient"):
+        for name, (nx, ny) in meshes.items():
+            run = program.run("biaxial.toml", f"{element}_{nx}", f"mesh.nx={nx}", f"mesh.ny={ny}", f"element.type={element}", *WEAK)
+            thickness[element, name] = band.band_of_run(run.folder).thickness
+            force[element, name] = -run.history()["force"][-1]
+    texts, ratios = {}, {}
+    for element in ("q8", "second_gradient"):
+        t, f = ([values[element, name] for name in meshes] for values in (thickness, force))
+        ratios[element] = t[1] / t[0], f[1] / f[0]
+        texts[element] = (f"thickness {t[0]:.3f} m on 6 x 12, {t[1]:.3f} m on 12 x 24 (elements {1 / 6:.3f} and {1 / 12:.3f} m), force at "
+                          f"2.4 % of strain {f[0] / 1e5:.3f} and {f[1] / 1e5:.3f} sigma_0 W")
+    return Row("Q8 of the first gradient: " + texts["q8"], "second gradient: " + texts["second_gradient"],
+               {"without the second gradient half the element gives less than 0.7 of the thickness": ratios["q8"][0] < 0.7,
+                "and a force that is more than 5 % lower": ratios["q8"][1] < 0.95,
+                "with it the thickness stays within 20 %": abs(ratios["second_gradient"][0] - 1) < 0.2,
+                "and the force within 1 %": abs(ratios["second_gradient"][1] - 1) < 0.01})
+
+
+def coarse_mesh(program):
+    """Elements too large for D: the program says so before the run, with the element or the D that would do."""
+    coarse = program.run("biaxial.toml", "coarse", "element.D=250.0", *WEAK)
+    fine = program.run("biaxial.toml", "second_gradient_12", "mesh.nx=12", "mesh.ny=24", *WEAK)
+    warning, none = coarse.line("the expected band is"), fine.line("the expected band is")
+    width, size = band.band_of_run(coarse.folder).thickness, 1 / 6
+    proper = band.band_of_run(fine.folder).thickness / math.sqrt(8)
+    return Row(f"D = 250 N on elements of {size:.3f} m: band {width:.3f} m = {width / size:.1f} elements, where the band of D = 2000 N on 12 x 24 "
+               f"scaled by sqrt(D) is {proper:.3f} m",
+               f"`{warning.removeprefix('warning: ')}`; on 12 x 24 with D = 2000 N: {'no warning' if not none else none}",
+               {"the coarse mesh is off by more than 20 %": abs(width / proper - 1) > 0.2, "a warning says so": "elements of 0.167 m" in warning,
+                "and none where the mesh is fine enough": not none})
+
+
+def identical_points(program):
+    """Without an imperfection nothing leaves the homogeneous solution."""
+    same = program.run("biaxial.toml", "identical", "control.end_time=0.6")
+    started = program.run("biaxial.toml", "started", "control.end_time=0.6", "solver.start_amplitude=0.5", "solver.start_time=0.26")
+    weak = program.run("biaxial.toml", "second_gradient_6", *WEAK)
+    uneven = [invariant(run).max() / invariant(run).mean() for run in (same, started, weak)]
+    return Row(f"identical points: exit status {same.status}, largest strain {uneven[0]:.2f} of the mean at 2.4 %, past the peak at "
+               f"{8 * same.history()['time'][int(np.argmin(same.history()['force']))] / 2:.2g} %",
+               f"`{same.line('all points are identical').removeprefix('warning: ')}`; with solver.start_amplitude = 0.5 {uneven[1]:.2f} of the "
+               f"mean, with a weak element {uneven[2]:.2f}",
+               {"identical points stay homogeneous past the peak": uneven[0] < 1.1,
+                "the program warns": "all points are identical" in same.said and "start_amplitude" in same.said,
+                "a seeded start localises": uneven[1] > 1.4, "a weak element localises": uneven[2] > 2,
+                "and neither is warned of": "identical" not in started.said + weak.said})
+
+
+AUTOMATIC = ("control.mode=automatic", 'control.loads=["inner"]', "control.measure=opening", "control.measure_edge=inner", "control.end_time=8.0")
+MEASURED = ("control.mode=measure", 'control.loads=["inner"]', "control.measure=volume", "control.measure_edge=inner",
+            "control.rate=0.016", "control.end_time=5.0")
+LAST_OPENING = 0.05  # m, of the inner radius of 1 m
+
+
+def moved_wall(nt=4):
+    """Loads in place of the inner pressure: every node of the inner wall moves outwards, by LAST_OPENING at the end."""
+    loads = ['{edge="start",kind="displacement",component="y",value=0.0}', '{edge="end",kind="displacement",component="x",value=0.0}']
+    for k in range(2 * nt + 1):
+        x, y = math.cos(math.pi / 4 * k / nt), math.sin(math.pi / 4 * k / nt)
+        for component, direction, held in (("x", x, 2 * nt), ("y", y, 0)):
+            if k != held:
+                loads.append(f'{{point=[{x:.6f},{y:.6f}],kind="displacement",component="{component}",value={LAST_OPENING * direction!r}}}')
+    return f"load=[{','.join(loads)}]"
+
+
+def pressure_curve(run):
+    """Opening [m] and pressure [Pa] inside: its factor, or from the reaction r_x = p (a + opening) of the moved wall."""
+    h = run.history()
+    opening = np.array(h["wall_x"]) * math.pi / 2  # the mean of cos over the quarter is 2 / pi
+    moved = np.max(h["pressure"]) == 0
+    return opening, np.array(h["reaction_x"]) / (1 + opening) if moved else np.array(h["pressure"])
+
+
+def limit_pressure(program):
+    """A cylinder under inner pressure: load control ends at the limit, automatic control passes it."""
+    load = program.run("cylinder.toml", "load_control")
+    runs = {"automatic control": program.run("cylinder.toml", "automatic_control", *AUTOMATIC),
+            "cavity volume": program.run("cylinder.toml", "volume_control", *MEASURED),
+            "moved wall": program.run("cylinder.toml", "moved_wall", moved_wall())}
+    curves = {name: pressure_curve(run) for name, run in runs.items()}
+    opening, pressure = curves["automatic control"]
+    peak, end = int(np.argmax(pressure)), min(curve[0][-1] for curve in curves.values())
+    grid = np.linspace(opening[peak], end, 100)
+    branch = np.interp(grid, opening, pressure)
+    off = {name: np.abs(np.interp(grid, *curve) / branch - 1).max() for name, curve in curves.items() if name != "automatic control"}
+    draw_limit(curves, pressure_curve(load), program.out / "limit_pressure.png")
+    return Row(f"load control: exit status {load.status} at {pressure_curve(load)[1][-1]:.4f} Pa, opening {pressure_curve(load)[0][-1]:.4f} m: "
+               f"{load.reason()}",
+               f"automatic control passes the limit {pressure.max():.4f} Pa at {opening[peak]:.4f} m and softens to {branch[-1]:.4f} Pa at "
+               f"{end:.4f} m; there control by the cavity's volume differs by at most {100 * off['cavity volume']:.2f} %, by the moved wall by "
+               f"{100 * off['moved wall']:.2f} %",
+               {"load control ends at the limit": load.status == 3 and abs(pressure_curve(load)[1][-1] / pressure.max() - 1) < 0.01,
+                "the others come to the end": all(run.status == 0 for run in runs.values()),
+                "automatic control has switched": bool(runs["automatic control"].line("limit point near")),
+                "the branch softens by more than 5 %": branch[-1] < 0.95 * pressure.max(),
+                "within 1 % of control by displacement": off["moved wall"] < 0.01, "and by volume": off["cavity volume"] < 0.01})
+
+
+def draw_limit(curves, load, file):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(5, 3.4))
+    for (name, (opening, pressure)), style in zip(curves.items(), ("-", ":", "--")):
+        axes.plot(opening, pressure, style, label=name)
+    axes.plot(*load, "k.", markersize=4, label="load control")
+    axes.set(xlabel="opening of the inner wall [m]", ylabel="inner pressure [Pa]")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+    figure.savefig(file, dpi=100, bbox_inches="tight")
+
+
 ROWS = {"consistent_tangent": consistent_tangent, "newton_cycle": newton_cycle, "elastic_operator": elastic_operator,
-        "large_increments": large_increments}
+        "large_increments": large_increments, "first_gradient": first_gradient, "coarse_mesh": coarse_mesh,
+        "limit_pressure": limit_pressure, "identical_points": identical_points}
