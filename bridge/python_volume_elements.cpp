@@ -172,6 +172,9 @@ void PythonVolumeElements::read(std::size_t index, const Plan& plan, Operator wa
   const double miss = (tensor(slot.stretch) - plan.U).norm() / plan.U.norm();
   if (!(miss <= 1e-9))
     return fail(fmt::format("its cell missed the stretch by {:.2e} (relative), limit 1e-09", miss), kSmallerStep);
+  if (response.report["contacts"] == 0)
+    return fail("it has lost all its contacts: no stress, no unbalanced force",
+                "It can carry no tension: keep it under pressure, give it ve.cohesion, or try a smaller load step.");
   const double unbalanced = response.report["unbalanced_force"];
   if (!(unbalanced <= options_.max_unbalanced_force))
     return fail(fmt::format("unbalanced force {:.1e} after {} steps, limit {:.1e}", unbalanced, slot.steps,
