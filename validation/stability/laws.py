@@ -130,6 +130,56 @@ def identical_points(program):
                 "and neither is warned of": "identical" not in started.said + weak.said})
 
 
+def solution(run):
+    """Which solution a biaxial run has ended in: homogeneous, or the band and where it crosses the axis x = 1/2 m."""
+    values = invariant(run)
+    if values.max() < 1.2 * values.mean():
+        return "homogeneous"
+    found = band.band_of_run(run.folder)
+    points = results.deformed_points(results.read_mesh(run.folder), results.read_step(run.folder)).reshape(-1, 2)
+    across = band.axes_of(found.inclination)[1]
+    strained = points[values.ravel() > 0.5 * values.max()]
+    elsewhere = np.mean(np.abs((strained - found.centre) @ across) > found.thickness)
+    if elsewhere > 0.25:
+        return "two bands"
+    height = found.centre[1] + (0.5 - found.centre[0]) * math.tan(math.radians(found.inclination))
+    return f"one band at {found.inclination:+.0f} degrees through y = {height:.2f} m"
+
+
+def uniqueness(program):
+    """One step started in five random directions: several solutions of one problem."""
+    settings = ("mesh.nx=8", "mesh.ny=16", "control.end_time=0.9")
+    runs = {"none": program.run("biaxial.toml", "seed_none", *settings)}
+    for seed in range(1, 6):
+        runs[seed] = program.run("biaxial.toml", f"seed_{seed}", *settings, "solver.start_amplitude=0.5", "solver.start_time=0.26",
+                                 f"solver.start_seed={seed}")
+    found = {seed: solution(run) for seed, run in runs.items()}
+    force = {seed: -run.history()["force"][-1] / 1e5 for seed, run in runs.items()}
+    draw_solutions(runs, found, force, program.out / "uniqueness.png")
+    families = {"homogeneous" if "one" not in s and "two" not in s else s.split(" through")[0][:13] for s in found.values()}
+    return Row(f"no random start: {found['none']}, {force['none']:.3f} sigma_0 W at 3.6 %, as if it were the only solution",
+               "; ".join(f"start_seed = {seed}: {found[seed]}, {force[seed]:.3f}" for seed in range(1, 6)),
+               {"every run comes to its end": all(run.status == 0 for run in runs.values()),
+                "without a start the run stays homogeneous": found["none"] == "homogeneous",
+                "the seeds find at least two others": len(families) >= 3,
+                "at a lower force": max(force[seed] for seed in range(1, 6)) < 0.97 * force["none"]})
+
+
+def draw_solutions(runs, found, force, file):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    from plot import draw_map
+
+    figure, panels = plt.subplots(1, len(runs), figsize=(1.6 * len(runs), 3.8))
+    for axes, (seed, run) in zip(panels, runs.items()):
+        draw_map(axes, results.read_mesh(run.folder), results.read_step(run.folder), "strain_invariant")
+        axes.set_title(f"seed {seed}\n{force[seed]:.3f}", fontsize=7)
+    figure.savefig(file, dpi=70, bbox_inches="tight")
+
+
 AUTOMATIC = ("control.mode=automatic", 'control.loads=["inner"]', "control.measure=opening", "control.measure_edge=inner", "control.end_time=8.0")
 MEASURED = ("control.mode=measure", 'control.loads=["inner"]', "control.measure=volume", "control.measure_edge=inner",
             "control.rate=0.016", "control.end_time=5.0")
@@ -198,4 +248,5 @@ def draw_limit(curves, load, file):
 
 ROWS = {"consistent_tangent": consistent_tangent, "newton_cycle": newton_cycle, "elastic_operator": elastic_operator,
         "large_increments": large_increments, "first_gradient": first_gradient, "coarse_mesh": coarse_mesh,
-        "limit_pressure": limit_pressure, "identical_points": identical_points}
+        "limit_pressure": limit_pressure, "identical_points": identical_points,
+        "uniqueness": uniqueness}
