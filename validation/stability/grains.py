@@ -69,19 +69,19 @@ def time_step(program):
 
 def rate(program):
     """A rate so high that inertia enters the stress."""
-    quick = ("ve.min_steps=1", "ve.inertial_number=0.1")
+    quick = ("ve.min_steps=1", "ve.inertial_number=0.3")
     reference = program.path(CASE, "rate_reference", STRAINED, cache(program), "ve.inertial_number=1e-3")
     normal = program.path(CASE, "rate_default", STRAINED, cache(program))
     silent = program.path(CASE, "rate_silent", STRAINED, cache(program), SILENT, *quick)
     refused = program.path(CASE, "rate_refused", STRAINED, cache(program), *quick)
     off, usual = distance(silent, reference), distance(normal, reference)
     report = normal.history()
-    return Row(f"inertial number 0.1, limit of the unbalanced force off: exit status {silent.status}, stress off by {100 * off:.0f} %",
+    return Row(f"inertial number 0.3, limit of the unbalanced force off: exit status {silent.status}, stress off by {100 * off:.0f} %",
                f"the same: exit status {refused.status}, {refused.reason()}; at the default 5e-3 off by {100 * usual:.1f} %, reported "
                f"at every step: inertial number {report['inertial_number'][-1]:.2g}, unbalanced force {report['unbalanced_force'][-1]:.2g}",
-               {"inertia spoils the stress silently": silent.status == 0 and off > 0.2,
+               {"inertia spoils the stress silently": silent.status == 0 and off > 0.1,
                 "it is refused": refused.status == 4 and "unbalanced force" in refused.said,
-                "the default rate is closer by far": normal.status == 0 and usual < 0.25 * off,
+                "the default rate is closer by far": normal.status == 0 and usual < 0.1 * off,
                 "inertial number and unbalanced force are reported": report["inertial_number"][-1] > 0})
 
 
@@ -97,20 +97,19 @@ def noise(program):
                f"`femxdem ve path --noise 4` measures {level:.1e}; with solver.noise = {level:.1e}: exit status {refused.status}, "
                f"{refused.said.strip().splitlines()[-1].split(': ', 1)[-1]}",
                {"without the noise the run fails for no visible reason": blind.status == 3,
-                "with it the tolerance is refused before the run, with the number": refused.status == 2 and f"{level:.1e}" in refused.said
-                or f"{level:g}" in refused.said})
+                "with it the tolerance is refused before the run, with the number": refused.status == 2 and f"{30 * level:.1e}" in refused.said})
 
 
 def lost_contacts(program):
     """A volume element that loses all its contacts, and one whose cell degenerates."""
     apart = program.path(CASE, "apart", "path=[{strain_xx=0.05,strain_yy=0.05,strain_zz=0.05,increments=20}]", cache(program))
-    flat = program.path(CASE, "flat", "path=[{strain_xx=-4.0,strain_yy=0.0,strain_zz=0.0,increments=8}]", cache(program))
-    last = apart.history()
+    flat = program.path(CASE, "flat", "path=[{strain_xx=-4.0,strain_yy=0.0,strain_zz=0.0,increments=40}]", cache(program))
+    last, ended = apart.history(), flat.said.strip().splitlines()[-1].rsplit("are in ", 1)[-1].split(": ", 1)[-1]
     return Row(f"5 % of extension without cohesion: {last['contacts'][0]:.0f} contacts become {last['contacts'][-1]:.0f} in "
                f"{apart.steps()} steps; a cell squeezed to exp(-4): YADE ends it in an exception after {flat.steps()} steps",
-               f"exit status {apart.status}, {apart.reason()}; exit status {flat.status}, {flat.reason()}; all steps before are kept",
+               f"exit status {apart.status}, {apart.reason()}; exit status {flat.status}, {ended}; all steps before are kept",
                {"no contacts: a failure that says so": apart.status == 4 and "contacts" in apart.reason(),
-                "degenerate cell: a failure that says so": flat.status == 4 and "cell" in flat.reason(),
+                "degenerate cell: a failure that says so": flat.status == 4 and "cell" in ended,
                 "the steps before are kept": apart.steps() > 1 and flat.steps() > 1})
 
 
