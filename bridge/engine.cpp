@@ -56,6 +56,7 @@ Engine::Engine(const std::string& name, const std::string& python_path) : interp
     throw std::runtime_error("engine '" + name + "': expected module:class, such as volume_element:Engine");
   in_python([&] {
     const py::list fields = py::cast(std::vector<std::string>(kReportFields.begin(), kReportFields.end()));
+    py::module_::import("sys").attr("path").attr("insert")(0, FEMXDEM_PYTHON_MODULES);
     py::module_::import("sys").attr("path").attr("insert")(0, python_path);
     py::module_ module = py::module_::import(name.substr(0, colon).c_str());
     engine_ = module.attr(name.substr(colon + 1).c_str())(fields);
@@ -108,8 +109,8 @@ void Engine::measure(int ve, Slot& slot) {
   in_python([&] { engine_.attr("measure")(ve, view(slot.stress), view(slot.report), view(slot.stretch)); });
 }
 
-void Engine::stiffness(int ve, Slot& slot) {
-  in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness)); });
+void Engine::stiffness(int ve, Slot& slot, bool relaxed) {
+  in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness), relaxed); });
 }
 
 pid_t Engine::fork() {

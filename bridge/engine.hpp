@@ -32,7 +32,7 @@ class Engine {
   void deform(int ve, Slot& slot);
   /// Stress, report and stretch into the slot.
   void measure(int ve, Slot& slot);
-  void stiffness(int ve, Slot& slot);
+  void stiffness(int ve, Slot& slot, bool relaxed);
 
   /// fork() with the interpreter's consent.
   static pid_t fork();

@@ -138,7 +138,8 @@ void PythonVolumeElements::run_trial(bool with_stiffness, std::vector<Response>&
   std::vector<int> deaths(size(), 0);
   with_stiffness_ = with_stiffness;
   for (;;) {
-    const Reply reply = worker_.request(Command::evaluate, with_stiffness, !options_.serialise);
+    const std::int64_t stiffness = !with_stiffness ? kNoStiffness : options_.relaxed ? kRelaxed : kAffine;
+    const Reply reply = worker_.request(Command::evaluate, stiffness, !options_.serialise);
     if (reply.kind == ReplyKind::done) {
       if (reply.value == 0 && !said_serialised_) {
         options_.say("volume elements are saved and restored at every trial instead of forked: slower" +

@@ -16,6 +16,7 @@ struct VolumeElementOptions {
   int min_steps = 10;                 ///< least DEM steps of a trial that strains
   double max_unbalanced_force = 0.2;  ///< an answer above is refused [-]
   double max_increment = 0.2;         ///< largest |ln U_inc| of one trial [-]
+  bool relaxed = false;               ///< the elastic stiffness is the relaxed one, not Eq. (2)
   bool serialise = false;             ///< no fork: states are saved and restored at every trial
   /// Where remarks go: a trial that was repeated, a fork that was refused.
   std::function<void(std::string_view)> say = [](std::string_view) {};

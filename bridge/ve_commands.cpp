@@ -72,7 +72,7 @@ std::vector<VeParameters> pool_of(const VeArguments& arguments) {
   return pool;
 }
 
-/// Runs a program and waits for it; its exit status.
+/// Runs a Python program with this one's modules and waits for it; its exit status.
 int run_program(std::vector<std::string> words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -80,6 +80,8 @@ int run_program(std::vector<std::string> words) {
   std::cout.flush();
   const pid_t pid = fork();
   if (pid == 0) {
+    setenv("PYTHONPATH", FEMXDEM_PYTHON_MODULES, 1);
+    setenv("OMP_NUM_THREADS", "1", 1);
     execv(arguments[0], arguments.data());
     _exit(127);
   }

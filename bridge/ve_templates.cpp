@@ -92,6 +92,7 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   options.inertial_number = ve.inertial_number;
   options.min_steps = ve.min_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
+  options.relaxed = ve.stiffness == VeStiffness::relaxed;
   options.serialise = ve.snapshot == Snapshot::serialise;
   return options;
 }

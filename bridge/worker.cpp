@@ -167,7 +167,7 @@ void Worker::evaluate(const Message& message) {
   if (snapshot_.empty()) take_snapshot();
   if (trial_in_process_) reject_in_process();
   trial_in_process_ = true;
-  deform_all(message.a == 1);
+  deform_all(message.a);
   reply(message, ReplyKind::done, 0);
 }
 
@@ -187,7 +187,7 @@ void Worker::await_child(const Message& message, pid_t child) {
 void Worker::serve_trial(const Message& message, pid_t committed) {
   die_with(committed);
   batch_.child = getpid();
-  deform_all(message.a == 1);
+  deform_all(message.a);
   reply(message, ReplyKind::done, 1);
   const auto verdict = receive();
   if (!verdict || verdict->command != Command::commit) _exit(kOrderlyExit);
@@ -224,24 +224,24 @@ void Worker::take_snapshot() {
   }
 }
 
-void Worker::deform_all(bool with_stiffness) {
+void Worker::deform_all(std::int64_t stiffness) {
   for (std::size_t i = 0; i < ves_.size(); ++i) {
     batch_.slots[i].outcome = Outcome::none;
     if (batch_.slots[i].task == Task::skip) continue;
     batch_.in_flight = static_cast<std::int64_t>(i);
-    deform_one(i, with_stiffness);
+    deform_one(i, stiffness);
   }
   batch_.in_flight = kNone;
 }
 
-void Worker::deform_one(std::size_t index, bool with_stiffness) {
+void Worker::deform_one(std::size_t index, std::int64_t stiffness) {
   Slot& slot = batch_.slots[index];
   const int ve = ves_[index];
   const auto start = std::chrono::steady_clock::now();
   try {
     if (slot.steps > 0) engine_.deform(ve, slot);
     engine_.measure(ve, slot);
-    if (with_stiffness) engine_.stiffness(ve, slot);
+    if (stiffness != kNoStiffness) engine_.stiffness(ve, slot, stiffness == kRelaxed);
     slot.outcome = Outcome::answered;
   } catch (const std::exception& error) {
     write_sentence(slot, error.what());

@@ -40,8 +40,8 @@ class Worker {
   /// The committed process, while its child works: reports its death unless it is orderly.
   void await_child(const Message& message, pid_t child);
   void adopt_trial(const Message& message, pid_t committed);
-  void deform_all(bool with_stiffness);
-  void deform_one(std::size_t index, bool with_stiffness);
+  void deform_all(std::int64_t stiffness);
+  void deform_one(std::size_t index, std::int64_t stiffness);
   void take_snapshot();
   void refresh(std::size_t index);
 

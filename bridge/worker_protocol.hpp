@@ -24,13 +24,18 @@ enum class Command : std::uint32_t {
   make_template,  ///< mail in: JSON; mail out: state (Reply::value bytes), then the manifest as JSON
   add,            ///< mail in: state; a: number of copies, at the end of the batch
   remove,         ///< a: index; those behind move up by one
-  evaluate,       ///< a: 1 with stiffness; b: 1 fork, 0 serialise; reply value: 1 if the trial was forked
+  evaluate,       ///< a: kAffine, ...; b: 1 fork, 0 serialise; reply value: 1 if the trial was forked
   commit,         ///< the trial becomes the committed state; reply value: process id of the committed process
   reject,         ///< the trial is given up; no reply
   save,           ///< a: index; mail out: state, from which the volume element goes on
   load,           ///< a: index; mail in: state
   quit            ///< no reply
 };
+
+/// Which stiffness an evaluation is to find.
+inline constexpr std::int64_t kNoStiffness = 0;
+inline constexpr std::int64_t kAffine = 1;
+inline constexpr std::int64_t kRelaxed = 2;
 
 struct Message {
   Command command = Command::quit;

@@ -62,7 +62,7 @@ def norms(c, name):
 
 # Pairs (i, j), i <= j, of a symmetric tensor's six components, and each component's place in them.
 _I, _J = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
-_PLACE = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+PLACE = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
 def fabric(c, weight):
@@ -78,12 +78,24 @@ def stiffness(c, kn, kt, volume):
     """
     l2 = c.length**2 / volume
     nn = c.normal[:, _I] * c.normal[:, _J]
-    C = (nn.T @ (((kn - kt) * l2)[:, None] * nn))[_PLACE[:, :, None, None], _PLACE]
-    G = 0.25 * fabric(c, kt * l2)[_PLACE]
+    C = (nn.T @ (((kn - kt) * l2)[:, None] * nn))[PLACE[:, :, None, None], PLACE]
+    G = 0.25 * fabric(c, kt * l2)[PLACE]
     d = np.eye(3)
     for spec in ("ik,jl->ijkl", "il,jk->ijkl", "jk,il->ijkl", "jl,ik->ijkl"):
         C += np.einsum(spec, d, G)
     return C
+
+
+def relaxed_stiffness(c, kn, kt, volume):
+    """Stiffness of the same contacts when the grains move and spin into equilibrium; (3, 3, 3, 3) [Pa].
+
+    C = C of Eq. (2) - (1/V) F^T K^-1 F: minimum over the grains' u, theta of (1/2) sum d.k.d with
+    d = E l + u_j - u_i - (r_i theta_i + r_j theta_j) x n. No contact slides, opens or turns (terms of order 1/kappa).
+    """
+    from contact_network import released_stiffness
+
+    released = released_stiffness(int(c.ids.max()) + 1, c.ids, c.normal, c.length, kn, kt, volume)
+    return stiffness(c, kn, kt, volume) - released[PLACE[:, :, None, None], PLACE]
 
 
 def one_tangent_stiffness(c, kn, kt, shear, volume):

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Draws a prepared volume element: packing.png, force_chains.png, fabric_rose.png.
+"""Draws a prepared volume element, packing.png, force_chains.png, fabric_rose.png, and finds its elastic stiffness,
+affine (Eq. (2)) and relaxed: stiffness.json.
 
     inspect_ve.py STATE [--out FOLDER]
 
@@ -7,7 +8,9 @@ STATE is a file of the cache of `femxdem ve prepare`.
 """
 
 import argparse
+import json
 import sys
+import time
 from pathlib import Path
 
 import matplotlib
@@ -26,7 +29,7 @@ class Packing:
 
     def __init__(self, state):
         engine = Engine([])
-        engine.add(state)
+        self.engine, self.ve = engine, engine.add(state)
         O = engine.O
         self.cell = np.array(O.cell.hSize).reshape(3, 3)
         x = np.array([O.cell.wrap(b.state.pos) for b in O.bodies])
@@ -83,6 +86,32 @@ def draw_fabric_rose(packing, file):
     _save(figure, file)
 
 
+def write_stiffness(packing, file):
+    """Both stiffnesses, 6 x 6 [Pa] in the order xx, yy, zz, xy, yz, zx, with the moduli of their isotropic parts."""
+    found = {}
+    for name in ("affine", "relaxed"):
+        out = np.empty(81)
+        start = time.perf_counter()
+        try:
+            packing.engine.stiffness(packing.ve, out, name == "relaxed")
+        except RuntimeError as reason:  # clumps, or contacts without stiffnesses
+            print(f"{name} stiffness: {reason}")
+            continue
+        seconds = time.perf_counter() - start
+        C = out.reshape(3, 3, 3, 3)
+        K = np.einsum("iikk", C) / 9
+        G = (np.einsum("ijij", C) - 3 * K) / 10
+        i, j = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
+        matrix = C[i[:, None], j[:, None], i, j].tolist()
+        found[name] = {"bulk_modulus": K, "shear_modulus": G, "seconds": seconds, "stiffness": matrix}
+        print(f"{name} stiffness: bulk modulus {K:.4g} Pa, shear modulus {G:.4g} Pa, found in {seconds:.3f} s")
+    if len(found) == 2:
+        ratios = [found["relaxed"][m] / found["affine"][m] for m in ("bulk_modulus", "shear_modulus")]
+        print("relaxed over affine: bulk modulus {:.3f}, shear modulus {:.3f}".format(*ratios))
+    file.write_text(json.dumps(found, indent=1) + "\n")
+    print(file)
+
+
 def _frame(axes, packing):
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)]) @ packing.cell.T
     axes.plot(corners[:, 0], corners[:, 1], color="tab:orange", linewidth=1)
@@ -109,6 +138,7 @@ def main():
     draw_packing(packing, arguments.out / "packing.png")
     draw_force_chains(packing, arguments.out / "force_chains.png")
     draw_fabric_rose(packing, arguments.out / "fabric_rose.png")
+    write_stiffness(packing, arguments.out / "stiffness.json")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,8 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report; (9,) the cell's
                                        deformation gradient from the reference (adopted) state. sliding_contacts and
                                        adhesive_contacts may be as old as 200 DEM steps, the rest is of now
-    stiffness(ve, out_stiffness)       (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised [Pa]
+    stiffness(ve, out_stiffness, relaxed)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised
+                                       [Pa]; relaxed: the same contact network with its grains in equilibrium
 """
 
 import os
@@ -100,7 +101,7 @@ class DummyEngine:
             time.sleep(3600)
         raise RuntimeError(f"dummy cell {ve} failed on purpose (fault = {kind}); choose a smaller step.")
 
-    def stiffness(self, ve, out_stiffness):
+    def stiffness(self, ve, out_stiffness, relaxed=False):
         cell = self.cells[ve]
         E, nu = cell["youngs_modulus"], cell["poisson_ratio"]
         lam, mu, d = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu)), np.eye(3)

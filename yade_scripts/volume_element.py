@@ -12,11 +12,12 @@ import adoption
 import contact_laws
 import contact_loop
 import packing
+import probing
 import user_scenes
 import yade_modules
 from time_step import safe_time_step
 
-DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_seconds": 600.0}
+DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
@@ -42,6 +43,7 @@ class _Grains:
     solid_volume: float  # [m^3]
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
+    clumped: bool
     states: list  # YADE's objects with positions and rotations
     new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
 
@@ -91,7 +93,8 @@ class Engine:
             user_scenes.load_scene(self.O, spec["scene"])
             return []
         if spec["source"] == "script":
-            return user_scenes.run_script(self.O, spec["script"], spec["arguments"], spec["script_seconds"])
+            limits = spec["script_steps"], spec["script_seconds"]
+            return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
         raise ValueError(f"ve.source = \"{spec['source']}\" is unknown: use \"prepare\", \"scene\" or \"script\".")
 
     def add(self, state):
@@ -134,6 +137,7 @@ class Engine:
         before = time.perf_counter()
         contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
         self._to_forces()
+        self._refuse_narrow_cell(ve)
         now = time.perf_counter()
         trial = self._trial[ve]
         trial.steps, trial.engine_seconds, trial.seconds = steps, now - before, now - started
@@ -144,7 +148,7 @@ class Engine:
         started = time.perf_counter()
         self._select(ve)
         trial, grains = self._trial[ve], self._grains[ve]
-        s = np.array(self._utils.getStress()).reshape(3, 3)
+        s = self._love_weber()
         out_stress[:] = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
         values = self._contact_network(grains)
@@ -162,20 +166,38 @@ class Engine:
         values["seconds"] = trial.seconds + time.perf_counter() - started
         out_report[:] = [values.get(name, 0.0) for name in self.report_fields]
 
-    def stiffness(self, ve, out_stiffness):
+    def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)
-        c = contact_loop.contacts(self.O)
-        if not contact_loop.has_stiffness(c):
+        c, volume = contact_loop.contacts(self.O), self.O.cell.volume
+        if contact_loop.has_stiffness(c) and not self._grains[ve].clumped:
+            kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
+            formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
+            C = formula(c, kn, kt, volume)
+        elif not relaxed:
+            C = probing.stiffness(self.O, self._love_weber, self._to_forces)
+        else:
             raise RuntimeError(
-                "The contacts of this volume element have no kn and ks, so Eq. (2) cannot be formed: use a stiffness by "
-                "perturbation."
+                "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
             )
-        kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
-        out_stiffness[:] = contact_loop.stiffness(c, kn, kt, self.O.cell.volume).ravel()
+        out_stiffness[:] = C.ravel()
 
     def _select(self, ve):
         if self.O.thisScene != ve:
             self.O.switchToScene(ve)
+
+    def _refuse_narrow_cell(self, ve):
+        """Two grains may touch once only: the cell must stay wider than two branch vectors."""
+        H = np.array(self.O.cell.hSize).reshape(3, 3)
+        width, grain = 1 / np.linalg.norm(np.linalg.inv(H), axis=1).max(), 2 * self._grains[ve].radius.max()
+        if not width > 2 * grain:
+            raise RuntimeError(
+                f"The cell has become too narrow: {width:.3g} m between two faces, two of its largest grains need "
+                f"{2 * grain:.3g} m. Use more grains (ve.spheres) for this distortion."
+            )
+
+    def _love_weber(self):
+        """Stress (3, 3) [Pa], tension positive, slightly asymmetric."""
+        return np.array(self._utils.getStress()).reshape(3, 3)
 
     def _to_forces(self):
         """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
@@ -187,7 +209,7 @@ class Engine:
 
     def _geometry(self, grains):
         """The numbers of protocol.py's info()."""
-        pressure = -np.trace(np.array(self._utils.getStress()).reshape(3, 3)) / 3
+        pressure = -np.trace(self._love_weber()) / 3
         return {
             "time_step": self.O.dt,
             "time_scale": _time_scale(grains, pressure),
@@ -226,9 +248,10 @@ def _grains(O):
     density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
     grains = [b for b in O.bodies if not b.isClumpMember]
     solid = sum(b.state.mass for b in grains) / density
+    clumped = any(b.isClump for b in O.bodies)
     states = [b.state for b in O.bodies]
     new_adhesion = contact_laws.adhesion_of_new_contacts(O)
-    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, states, new_adhesion)
+    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, clumped, states, new_adhesion)
 
 
 def _mean_rotation(states):

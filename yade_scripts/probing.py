@@ -1,0 +1,64 @@
+"""The elastic stiffness of volume elements whose contacts do not tell it, or whose grains are clumps: by small strains."""
+
+import os
+
+import numpy as np
+
+from contact_loop import PLACE
+
+STRAIN = 1e-7  # each way; overlaps are thousands of times larger
+SHORT = 1e-4  # of the time step, so that grains are carried by the cell and have no time to move on their own
+
+
+def stiffness(O, stress, to_forces):
+    """Affine stiffness of YADE's current scene, which rests where `to_forces` leaves it; (3, 3, 3, 3) [Pa].
+
+    stress() -> (3, 3). The grains follow the cell, as in Eq. (2); a contact at its Coulomb limit slips in one of the two
+    directions of a probe and counts by half its tangential stiffness. Done in a forked process: the scene is not touched.
+    """
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.write(writer, _probed(O, stress, to_forces).tobytes())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as answer:
+        C = np.frombuffer(answer.read())
+    os.waitpid(child, 0)
+    if C.size != 36 or not np.isfinite(C).all():
+        raise RuntimeError("the stiffness of this volume element cannot be probed: its contact law fails at small strains.")
+    C = C.reshape(6, 6)
+    return (0.5 * (C + C.T))[PLACE[:, :, None, None], PLACE]
+
+
+def _probed(O, stress, to_forces):
+    from yade._utils import calm
+    from yade.utils import Matrix3
+
+    short = SHORT * O.dt
+
+    def strain(L, dt):
+        O.cell.velGrad, O.dt = Matrix3(*L.ravel()), dt
+        O.step()
+
+    def at(L):
+        """Stress after the strain L * short, without velocities: viscous forces are none of the stiffness."""
+        strain(L, short)
+        to_forces()
+        strain(np.zeros((3, 3)), 0.0)
+        calm()
+        to_forces()
+        s = stress()
+        return 0.5 * (s + s.T)
+
+    at(np.zeros((3, 3)))
+    C = np.empty((6, 6))
+    for a in range(6):
+        L = (PLACE == a) * (STRAIN / short) / (PLACE == a).sum()
+        forth, back = at(L), at(-2 * L)
+        at(L)
+        for b in range(6):
+            C[b, a] = (forth - back)[PLACE == b][0] / (2 * STRAIN)
+    return C
