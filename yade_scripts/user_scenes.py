@@ -22,13 +22,13 @@ def load_scene(O, path):
         ) from error
 
 
-def run_script(O, path, arguments, seconds):
+def run_script(O, path, arguments, steps, seconds):
     """Runs `path` as `yade -n path arguments...` would, in __main__ (where YADE looks for the names of hooks).
 
     Windows are not opened: yade.qt is replaced by a module that answers to any name. A simulation left running in the
-    background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. After
-    `seconds` of wall time the script is stopped where it is. Returns sentences on what was special.
-    Raises ValueError when the script is missing or fails.
+    background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. The script is
+    stopped where it is when its scene has made `steps` DEM steps, or, for want of steps, after `seconds` of wall time.
+    Returns sentences on what was special. Raises ValueError when the script is missing, fails, or one of its hooks does.
     """
     if not Path(path).is_file():
         raise ValueError(f've.script = "{path}": no such file.')
@@ -44,6 +44,8 @@ def run_script(O, path, arguments, seconds):
     clock.start()
     here = os.getcwd()
     sys.path.insert(0, str(Path(path).resolve().parent))
+    sys.last_value = None  # where Python leaves the error of a hook, which YADE only reports as one of its own
+    restore = _limit_steps(O, steps)
     try:
         exec(compile(Path(path).read_text(), str(path), "exec"), names)
         if O.iter == 0 and O.engines:
@@ -51,19 +53,74 @@ def run_script(O, path, arguments, seconds):
             O.run()
         if O.running:
             O.wait()
+    except _EnoughSteps:
+        pass
     except _TimeUp:
         notes.append(f"the script's simulation was stopped after {seconds:g} s")
     except SystemExit:
         notes.append("the script called exit")
     except Exception as error:
-        raise ValueError(f've.script = "{path}" failed: {type(error).__name__}: {error}') from error
+        true = sys.last_value or error
+        where = "failed in one of its hooks" if sys.last_value else "failed"
+        raise ValueError(f've.script = "{path}" {where}: {type(true).__name__}: {true}') from error
     finally:
         clock.cancel()
+        restore()
         while O.running:
             O.pause()
             time.sleep(0.05)
         os.chdir(here)
+    if O.iter >= steps:
+        notes.append(f"the script's simulation was stopped after {steps} steps")
     return notes
+
+
+class _EnoughSteps(BaseException):
+    """Raised in the script when its scene has made its steps."""
+
+
+def _limit_steps(O, limit):
+    """From now on run, wait and step of YADE's scene end at step number `limit`; returns what undoes it. The other scene,
+    where yade.pack makes packings, has no limit."""
+    Omega = type(O)
+    original = {name: getattr(Omega, name) for name in ("run", "wait", "step", "switchScene")}
+    in_other_scene = False
+
+    def stop_at_limit():
+        if O.iter >= limit and not O.running and not in_other_scene:
+            raise _EnoughSteps
+
+    def run(self, nSteps=-1, wait=False):
+        stop_at_limit()
+        if in_other_scene:
+            return original["run"](self, nSteps, wait)
+        left = limit - O.iter
+        if nSteps <= 0 and O.stopAtIter > O.iter:
+            nSteps = O.stopAtIter - O.iter
+        original["run"](self, min(nSteps, left) if nSteps > 0 else left, wait)
+        if wait:
+            stop_at_limit()
+
+    def wait(self):
+        original["wait"](self)
+        stop_at_limit()
+
+    def step(self):
+        stop_at_limit()
+        original["step"](self)
+
+    def switch_scene(self):
+        nonlocal in_other_scene
+        in_other_scene = not in_other_scene
+        original["switchScene"](self)
+
+    Omega.run, Omega.wait, Omega.step, Omega.switchScene = run, wait, step, switch_scene
+
+    def undo():
+        for name, function in original.items():
+            setattr(Omega, name, function)
+
+    return undo
 
 
 class _TimeUp(BaseException):
