@@ -13,10 +13,11 @@ import time
 import traceback
 from pathlib import Path
 
+import grains
 import laws
 from program import HERE, Program, Row
 
-ROWS = {**laws.ROWS}
+ROWS = {**grains.ROWS, **laws.ROWS}
 
 
 def attempt(function, program):
