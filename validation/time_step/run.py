@@ -4,11 +4,10 @@
     validation/time_step/run.py [--out FOLDER] [--spheres N] [--seed S]
 
 Each packing is strained along a biaxial path by 2 % (stiff ones by 10/kappa) with many time steps; the largest stable one
-is found by bisection.
-A step is unstable where the mean kinetic energy of the path's second half exceeds 1.5 times that at 3/4 of the critical
-step, or the stresses are off by more than 1 % and more than 3 times what half and 3/4 of the critical step differ by
-(where contacts slide, the energy alone does not tell). Writes FOLDER/table.csv, table.md and time_step.png, and what the
-stress is off at 1.5 times the critical step; packings that are in table.csv already are not repeated.
+is found by bisection. A step is unstable where the mean kinetic energy of the path's second half exceeds 1.5 times that at
+3/4 of the critical step, or the stresses are off by more than 1 % and more than 3 times what half and 3/4 of the critical
+step differ by (where contacts slide, the energy alone does not tell). Writes FOLDER/table.csv, table.md, with what the
+stress is off at 1.5 times the critical step, and time_step.png; packings that are in table.csv are not repeated.
 """
 
 import argparse

@@ -7,8 +7,6 @@ Writes FOLDER/table.md and ve_biaxial.png; runs that are done already are not re
 """
 
 import argparse
-import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -21,23 +19,16 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 from results import path_curve, read_history
+from ve_runs import ve_path
 
 
-def run(program, folder, seed, spheres):
-    summary = folder / "summary.json"
-    if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
-        subprocess.run([program, "ve", "path", HERE / "case.toml", "--out", folder, "--overwrite", "--set", f"ve.seed={seed}",
-                        "--set", f"ve.spheres={spheres}"], check=True, stdout=subprocess.DEVNULL)
-    return json.loads(summary.read_text())
-
-
-def row(folder, seed, summary):
+def row(folder, seed):
     """Markdown row: peak, where, value at the end, porosity at start and end, what it cost."""
     curve, h = path_curve(folder), read_history(folder)
     peak = int(np.argmax(curve.stress))
     cells = [seed, f"{curve.stress[peak]:.2f}", f"{100 * curve.strain[peak]:.1f}", f"{curve.stress[-10:].mean():.2f}",
              f"{h['porosity'][0]:.3f}", f"{h['porosity'][-1]:.3f}", f"{h['evaluations'][1:].mean():.2f}",
-             f"{h['evaluations'].max():.0f}", f"{summary['engine_seconds']:.0f}"]
+             f"{h['evaluations'].max():.0f}", f"{h['dem_steps'].sum():.0f}"]
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
@@ -58,7 +49,7 @@ def draw(folders, file):
     figure.savefig(file, dpi=100)
 
 
-HEADER = """| seed | peak / sigma_0 | at [%] | at the end (mean of 10) | porosity, start | end | evaluations a step | most | DEM s |
+HEADER = """| seed | peak / sigma_0 | at [%] | at the end (mean of 10) | porosity, start | end | evaluations a step | most | DEM steps |
 |---|---|---|---|---|---|---|---|---|
 """
 
@@ -69,11 +60,14 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("out/ve_biaxial"))
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--spheres", type=int, default=1000)
+    parser.add_argument("--cache", help="folder of prepared packings")
     a = parser.parse_args()
+    cache = {"ve.cache": a.cache} if a.cache else {}
     folders, rows = {}, []
     for seed in a.seeds:
         folders[seed] = a.out / f"seed_{seed}"
-        rows.append(row(folders[seed], seed, run(Path(a.femxdem).resolve(), folders[seed], seed, a.spheres)))
+        ve_path(Path(a.femxdem).resolve(), folders[seed], {"ve.seed": seed, "ve.spheres": a.spheres, **cache})
+        rows.append(row(folders[seed], seed))
         print(rows[-1], flush=True)
     (a.out / "table.md").write_text(HEADER + "\n".join(rows) + "\n")
     draw(folders, a.out / "ve_biaxial.png")
