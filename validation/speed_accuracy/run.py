@@ -1,0 +1,178 @@
+#!/usr/bin/python3
+"""Cost of a volume element against its error: spheres x inertial number x time-step safety.
+
+    validation/speed_accuracy/run.py [--femxdem PROGRAM] [--out FOLDER] [--cache FOLDER] [--spheres N ...] [--seeds S ...]
+                                     [--inertial-numbers I ...] [--safeties F ...]
+
+The biaxial path of validation/ve_biaxial to 5 %. Two errors of the axial stress, each a root mean square over the path over
+that of the stress and over the seeds: `same packing`, from the same packing at the slowest setting; `total`, from the
+reference, the mean over the seeds of the most spheres at the slowest setting. The reference's own error: what the next
+faster setting differs from it by (`same packing`), and the standard error of its mean over the seeds. Writes FOLDER/table.csv, table.md and speed_accuracy.png; runs that
+are done already are not repeated.
+"""
+
+import argparse
+import csv
+import itertools
+import os
+import sys
+import time
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = "1"
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+from ve_runs import dem_steps, relative_distance, strain_until, stresses, ve_path
+
+STRAIN = 0.05
+GRID = np.linspace(0.0, STRAIN, 51)
+
+
+class Campaign:
+    """Curves and DEM steps of (spheres, inertial number, safety, seed)."""
+
+    def __init__(self, a):
+        self.a, self.program = a, Path(a.femxdem).resolve()
+        self.curves, self.steps = {}, {}
+
+    def run(self, spheres, number, safety, seed):
+        key = (spheres, number, safety, seed)
+        folder = self.a.out / f"{spheres}_{number:g}_{safety:g}_{seed}"
+        settings = {"ve.spheres": spheres, "ve.inertial_number": number, "ve.time_step_safety": safety, "ve.seed": seed,
+                    "ve.cache": self.a.cache.resolve()}
+        summary = ve_path(self.program, folder, {**settings, **strain_until(STRAIN)})
+        if summary["status"] != "done":
+            print(f"left out: {folder}: {summary['message']}", flush=True)
+            return
+        self.curves[key], self.steps[key] = stresses(folder, GRID), dem_steps(folder)
+        print(key, self.steps[key], f"peak {self.curves[key].max():.2f}", flush=True)
+
+    def settings(self):
+        return list(dict.fromkeys(key[:3] for key in self.curves))
+
+    def reference(self):
+        """Mean curve and the standard error of that mean, relative."""
+        most, slowest, safety = self.slowest()
+        curves = np.array([c for key, c in self.curves.items() if key[:3] == (most, slowest, safety)])
+        mean = curves.mean(axis=0)
+        spread = np.sqrt(np.mean([relative_distance(c, mean) ** 2 for c in curves]))
+        return mean, spread / np.sqrt(max(len(curves) - 1, 1)) if len(curves) > 1 else float("nan")
+
+    def slowest(self, spheres=None):
+        spheres = spheres or max(key[0] for key in self.curves)
+        number = min(key[1] for key in self.curves if key[0] == spheres)
+        return spheres, number, min(key[2] for key in self.curves if key[:2] == (spheres, number))
+
+    def errors(self, setting):
+        """Same packing, total; root mean squares over the seeds."""
+        mean, slowest = self.reference()[0], self.slowest(setting[0])
+        mine = {key[3]: c for key, c in self.curves.items() if key[:3] == setting}
+        same = [relative_distance(c, self.curves[slowest + (seed,)]) for seed, c in mine.items() if slowest + (seed,) in self.curves]
+        total = [relative_distance(c, mean) for c in mine.values()]
+        rms = lambda x: float(np.sqrt(np.mean(np.square(x)))) if x else float("nan")
+        return rms(same), rms(total)
+
+    def mean_steps(self, setting):
+        return float(np.mean([n for key, n in self.steps.items() if key[:3] == setting]))
+
+
+def seconds_a_step(spheres, cache):
+    """Core seconds of one DEM step, by process time: a busy machine does not count."""
+    sys.path.insert(0, str(HERE.parent.parent / "yade_scripts"))
+    from volume_element import Engine
+
+    engine = seconds_a_step.engine = getattr(seconds_a_step, "engine", None) or Engine(("unbalanced_force",))
+    states = [s for s in cache.glob("*.state") if f'"spheres": {spheres},' in s.with_suffix(".json").read_text()]
+    if not states:
+        return float("nan")
+    ve = engine.add(states[0].read_bytes())
+    L = 30.0 * np.diag([0.5, -1.0, 0.0])
+    engine.deform(ve, L, 20)
+    before = time.process_time()
+    engine.deform(ve, L, 200)
+    seconds = (time.process_time() - before) / 200
+    engine.remove(ve)
+    return seconds
+
+
+def front(rows, cost, error):
+    """Rows than which no other is both cheaper and more accurate."""
+    return [r for r in rows if not any(o[cost] <= r[cost] and o[error] < r[error] for o in rows)]
+
+
+def rows_of(campaign, seconds):
+    rows = []
+    for setting in campaign.settings():
+        same, total = campaign.errors(setting)
+        steps = campaign.mean_steps(setting)
+        rows.append({"spheres": setting[0], "inertial_number": setting[1], "safety": setting[2], "dem_steps": steps,
+                     "core_seconds": steps * seconds[setting[0]], "same_packing": same, "total": total})
+    chosen = front(rows, "core_seconds", "total")
+    for r in rows:
+        r["front"] = r in chosen
+    return sorted(rows, key=lambda r: r["core_seconds"])
+
+
+def write(folder, rows):
+    with open(folder / "table.csv", "w", newline="") as stream:
+        writer = csv.DictWriter(stream, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    lines = ["| spheres | inertial number | safety | DEM steps | core seconds | same packing [%] | total [%] | non-dominated |",
+             "|---|---|---|---|---|---|---|---|"]
+    for r in rows:
+        lines.append(f"| {r['spheres']} | {r['inertial_number']:g} | {r['safety']:g} | {r['dem_steps']:.0f} | {r['core_seconds']:.2f} | "
+                     f"{100 * r['same_packing']:.1f} | {100 * r['total']:.1f} | {'yes' if r['front'] else ''} |")
+    (folder / "table.md").write_text("\n".join(lines) + "\n")
+
+
+def draw(folder, rows):
+    figure, axes = plt.subplots(1, 2, figsize=(8, 3.3))
+    for one, error in zip(axes, ("same_packing", "total")):
+        for k, spheres in enumerate(sorted({r["spheres"] for r in rows})):
+            mine = [r for r in rows if r["spheres"] == spheres and r[error] > 0]
+            one.loglog([r["core_seconds"] for r in mine], [100 * r[error] for r in mine], "o", color=f"C{k}", markersize=4,
+                       label=f"{spheres} spheres")
+            for r in mine:
+                one.annotate(f"{r['inertial_number']:g}", (r["core_seconds"], 100 * r[error]), fontsize=5)
+        one.set_xlabel("core seconds of the path")
+        one.grid(alpha=0.3, which="both")
+    best = [r for r in rows if r["front"]]
+    axes[1].loglog([r["core_seconds"] for r in best], [100 * r["total"] for r in best], "k-", linewidth=0.8, label="non-dominated")
+    axes[0].set_ylabel("error [%], same packing at the slowest setting", fontsize=8)
+    axes[1].set_ylabel("error [%], against the reference", fontsize=8)
+    axes[1].legend(fontsize=6)
+    figure.tight_layout()
+    figure.savefig(folder / "speed_accuracy.png", dpi=90)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
+    parser.add_argument("--out", type=Path, default=Path("out/speed_accuracy"))
+    parser.add_argument("--cache", type=Path, default=Path("packings"))
+    parser.add_argument("--spheres", type=int, nargs="+", default=[100, 200, 400, 1000])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--inertial-numbers", type=float, nargs="+", default=[1e-2, 5e-3, 2e-3, 1e-3, 5e-4])
+    parser.add_argument("--safeties", type=float, nargs="+", default=[0.8, 0.4])
+    a = parser.parse_args()
+    a.out.mkdir(parents=True, exist_ok=True)
+    campaign = Campaign(a)
+    for safety, spheres, seed, number in itertools.product(a.safeties, a.spheres, a.seeds, a.inertial_numbers):
+        campaign.run(spheres, number, safety, seed)
+    seconds = {n: seconds_a_step(n, a.cache) for n in a.spheres}
+    rows = rows_of(campaign, seconds)
+    write(a.out, rows)
+    draw(a.out, rows)
+    print((a.out / "table.md").read_text())
+    print(f"reference's own scatter of the mean: {100 * campaign.reference()[1]:.1f} %; core seconds of a DEM step: {seconds}")
+
+
+if __name__ == "__main__":
+    main()
