@@ -28,7 +28,8 @@ std::string read_file(const fs::path& file) {
   return text.str();
 }
 
-/// What the prepared state depends on: the specification, the files that it names, the versions and scripts that make it.
+/// What the prepared state depends on: the specification, the files that it names, the versions and scripts that make
+/// it.
 std::string key_of(const VeParameters& ve, const std::string& specification, const std::string& versions) {
   std::string key = specification + versions;
   for (const std::string& file : {ve.script, ve.scene}) {

@@ -21,7 +21,7 @@ struct IterationRecord {
   double dem_seconds_mean = 0;  ///< over the points [s]
   double solve_seconds = 0;     ///< assembly and solution
   int element = 0;              ///< farthest out of balance
-  std::string note;  ///< such as "cut" or the point that failed; mostly empty
+  std::string note;             ///< such as "cut" or the point that failed; mostly empty
 };
 
 /// What the run says: everything goes to log.txt, the essential also to the terminal. A terminal shows the progress on

@@ -13,7 +13,9 @@
 /// and the bridge to YADE knows the finite elements only through it.
 namespace femxdem {
 
-/// What a material point reports beside its stress. One list: results files, shared memory and the Python side follow it.
+/// What a material point reports beside its stress. One list: results files, shared memory and the Python side follow
+/// it.
+// clang-format off
 inline constexpr std::array<std::string_view, 20> kReportFields = {
     "dem_steps",          // DEM steps of this trial
     "seconds",            // wall time of this trial [s]
@@ -31,10 +33,12 @@ inline constexpr std::array<std::string_view, 20> kReportFields = {
     "sliding_contacts",   // contacts at the Coulomb limit over all contacts [-]
     "contacts",           // number of contacts [-]
 };
+// clang-format on
 
 struct PointReport {
-  std::array<double, kReportFields.size()> values{};  ///< in the order of kReportFields; 0 where a law has no such quantity
-  double& operator[](std::string_view field);         ///< throws std::out_of_range on an unknown field
+  /// In the order of kReportFields; 0 where a law has no such quantity.
+  std::array<double, kReportFields.size()> values{};
+  double& operator[](std::string_view field);  ///< throws std::out_of_range on an unknown field
   double operator[](std::string_view field) const;
 };
 
@@ -56,7 +60,8 @@ struct Response {
 /// Which stiffness a trial is asked for.
 enum class Operator {
   none,     ///< stress only; Response::stiffness stays NaN
-  elastic,  ///< sigma = C : sym(grad du) with both minor symmetries [Pa]; for a volume element Eq. (2) of Nguyen et al. (2017)
+  elastic,  ///< sigma = C : sym(grad du) with both minor symmetries [Pa]; for a volume element Eq. (2) of Nguyen et al.
+            ///< (2017)
   tangent,  ///< d sigma / d(spatial gradient) [Pa], spin of the stress included; only for laws in closed form
 };
 
@@ -66,15 +71,15 @@ using SavedStates = std::vector<std::string>;
 /// A batch of material points with a committed and a trial state.
 ///
 /// Contract, tested on every implementation (tests/material_points_contract.hpp): equal F give equal bits; evaluate
-/// leaves the committed state alone; a rejected trial leaves no trace; commit then continue is one longer path; save and
-/// load give the same bits; det F <= 0 or NaN is a failure value that names the point.
+/// leaves the committed state alone; a rejected trial leaves no trace; commit then continue is one longer path; save
+/// and load give the same bits; det F <= 0 or NaN is a failure value that names the point.
 class MaterialPoints {
  public:
   virtual ~MaterialPoints() = default;
   /// Number of points of the batch.
   virtual std::size_t size() const = 0;
-  /// A new load step starts (also after a cut): whatever is frozen during a step's iterations, such as the number of DEM
-  /// steps of a point, is chosen anew at the next evaluate.
+  /// A new load step starts (also after a cut): whatever is frozen during a step's iterations, such as the number of
+  /// DEM steps of a point, is chosen anew at the next evaluate.
   virtual void begin_step() {}
   /// Responses to the trial deformation gradients F (size() of them, from the reference configuration), each reached
   /// from the point's committed state.
