@@ -72,6 +72,16 @@ TEST(SolveStep, UniformStrainIsExactAtFiniteStrainOnADistortedMesh) {
   }
 }
 
+TEST(SolveStep, ForcesInBalanceAreNotBlamedForAMissedCriterion) {
+  Block block(block_mesh(), kJaumann, 0.1, true);
+  SolverParameters parameters = newton();
+  parameters.displacement_tolerance = 0;
+  NonlinearSolver solver(*block.element, block.points, block.loads, parameters);
+  const StepResult result = solver.solve_step(1);
+  EXPECT_FALSE(result.converged);
+  EXPECT_NE(result.reason.find("the forces balance"), std::string::npos) << result.reason;
+}
+
 /// |r_(k+1)| <= 5 |r_k|^2 down to round-off, in one step to 30 %, with the default penalty of the multiplier.
 TEST(SolveStep, NewtonIsQuadraticAtThirtyPercent) {
   for (const double D : {0.0, 20.0}) {
