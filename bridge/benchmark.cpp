@@ -50,11 +50,11 @@ std::vector<Tensor2> gradients(std::size_t points, int trial) {
   return std::vector<Tensor2>(points, F);
 }
 
-/// Processor time of a worker and of all that it has forked so far [s].
 struct ProcessorTime {
-  double all = 0, kernel = 0;
+  double all = 0, kernel = 0;  ///< kernel: part of all
 };
 
+/// Processor time of a worker and of all that it has forked so far [s].
 ProcessorTime processor_time(const WorkerProcess& worker) {
   std::ifstream file(fmt::format("/proc/{}/stat", worker.pid()));
   std::string line;

@@ -52,12 +52,7 @@ std::map<std::string, std::string> parse_strings(const std::string& json) {
 
 TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve) {
   const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
-  VeParameters packing = ve;  // what only its trials depend on makes no other packing
-  const VeParameters any;
-  packing.inertial_number = any.inertial_number;
-  packing.min_steps = any.min_steps;
-  packing.max_unbalanced_force = any.max_unbalanced_force;
-  const std::string name = key_of(ve, ve_spec_json(packing), elements.versions());
+  const std::string name = key_of(ve, ve_spec_json(ve), elements.versions());
   return {folder / (name + ".state"), folder / (name + ".json")};
 }
 

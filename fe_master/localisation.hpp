@@ -4,6 +4,9 @@
 
 namespace femxdem {
 
+/// In-plane acoustic tensor A_ik = n_j C_ijkl n_l [Pa] of the direction n = (n[0], n[1]).
+Eigen::Matrix2d acoustic_tensor(const Tensor4& C, const Eigen::Vector2d& n);
+
 /// Smallest determinant of the in-plane acoustic tensor A_ik = n_j C_ijkl n_l [Pa^2] over the directions of a band
 /// (Rice, 1976): a shear band can form once it is not positive. `tangent` is d sigma / dh with the spin of the stress
 /// included (Operator::tangent); at finite strain the geometric terms sigma_ij d_kl - sigma_il d_jk then cancel, since

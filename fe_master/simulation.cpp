@@ -293,10 +293,14 @@ void Run::finish(int status, const std::string& message) {
 
 std::unique_ptr<Element> make_element(const Case& c, const Mesh& mesh) {
   if (c.element.type == ElementType::q8) return std::make_unique<Element>(mesh);
-  if (c.element.mindlin.empty()) return std::make_unique<SecondGradientQ8>(mesh, one_parameter_law(c.element.D), 0.0);
+  return std::make_unique<SecondGradientQ8>(mesh, make_double_stiffness(c.element), 0.0);
+}
+
+DoubleStiffness make_double_stiffness(const ElementParameters& e) {
+  if (e.mindlin.empty()) return one_parameter_law(e.D);
   std::array<double, 5> a{};
-  std::copy_n(c.element.mindlin.begin(), 5, a.begin());
-  return std::make_unique<SecondGradientQ8>(mesh, mindlin_law(a), 0.0);
+  std::copy_n(e.mindlin.begin(), 5, a.begin());
+  return mindlin_law(a);
 }
 
 AnalyticLaw make_law(const MaterialParameters& m) {

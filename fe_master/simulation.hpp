@@ -8,6 +8,7 @@
 
 #include "analytic_laws.hpp"
 #include "case.hpp"
+#include "double_stress.hpp"
 #include "element.hpp"
 #include "material_points.hpp"
 #include "output_folder.hpp"
@@ -35,6 +36,9 @@ struct RunOptions {
 
 /// Finite elements of a case on its mesh.
 std::unique_ptr<Element> make_element(const Case& c, const Mesh& mesh);
+
+/// The law of the double stress of a second-gradient element.
+DoubleStiffness make_double_stiffness(const ElementParameters& e);
 
 /// The law in closed form of a case's material.
 AnalyticLaw make_law(const MaterialParameters& m);

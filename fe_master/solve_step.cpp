@@ -83,8 +83,9 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
   while (result.iterations() < parameters_.max_iterations) {
     Iteration& now = result.table.emplace_back();
     if (!evaluate(trial, result)) return result;
-    now.residual = relative_residual(trial);
-    now.element = largest(element_residuals(trial));
+    const Eigen::VectorXd residual = scaled_residual(trial);
+    now.residual = residual.norm();
+    now.element = largest(of_elements(residual));
     history.add(now.residual);
     if (result.reason = history.hopeless(operators_.memoryless()); !result.reason.empty()) break;
     if (now.residual > parameters_.tolerance && search.rejects(now.residual)) {
@@ -295,7 +296,11 @@ Eigen::VectorXd NonlinearSolver::scaled_residual(const Equilibrium& state) const
 double NonlinearSolver::relative_residual(const Equilibrium& state) const { return scaled_residual(state).norm(); }
 
 std::vector<double> NonlinearSolver::element_residuals(const Equilibrium& state) const {
-  const Eigen::VectorXd residual = scaled_residual(state);
+  return of_elements(scaled_residual(state));
+}
+
+/// Norms of a residual over the unknowns of each element.
+std::vector<double> NonlinearSolver::of_elements(const Eigen::VectorXd& residual) const {
   std::vector<double> norms;
   for (std::size_t e = 0; e < element_.mesh().elements.size(); ++e)
     norms.push_back(residual(element_.dofs(static_cast<int>(e))).norm());

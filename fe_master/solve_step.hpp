@@ -98,6 +98,7 @@ class NonlinearSolver {
   bool accept_best(Equilibrium& best, StepResult& result);
   void commit(Equilibrium& trial, double dt);
   Eigen::VectorXd scaled_residual(const Equilibrium& state) const;
+  std::vector<double> of_elements(const Eigen::VectorXd& residual) const;
 
   Element& element_;
   MaterialPoints& points_;

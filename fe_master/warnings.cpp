@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 
+#include "localisation.hpp"
 #include "simulation.hpp"
 
 namespace femxdem {
@@ -15,29 +16,17 @@ namespace {
 constexpr double kElementsForForce = 4, kElementsForWidth = 14;  // across the band, on the bilinear bar
 constexpr double kVeSoftening = 1.4;                             // |a| / sigma_0
 
-Eigen::Matrix2d acoustic(const Tensor4& C, double angle) {
-  const double n[2] = {std::cos(angle), std::sin(angle)};
-  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      for (int k = 0; k < 2; ++k) {
-        for (int l = 0; l < 2; ++l) A(i, k) += n[j] * C(pair(i, j), pair(k, l)) * n[l];
-      }
-    }
-  }
-  return A;
-}
-
 /// The most negative eigenvalue over the directions, and the elastic modulus along its eigenvector.
 BandModuli least_moduli(const Tensor4& tangent, const Tensor4& elastic) {
   BandModuli moduli;
   for (int direction = 0; direction < 180; ++direction) {
     const double angle = direction * std::numbers::pi / 180;
-    const Eigen::EigenSolver<Eigen::Matrix2d> eigen(acoustic(tangent, angle));
+    const Eigen::Vector2d n(std::cos(angle), std::sin(angle));
+    const Eigen::EigenSolver<Eigen::Matrix2d> eigen(acoustic_tensor(tangent, n));
     for (int i = 0; i < 2; ++i) {
       if (eigen.eigenvalues()[i].imag() != 0 || eigen.eigenvalues()[i].real() >= -moduli.softening) continue;
       const Eigen::Vector2d g = eigen.eigenvectors().col(i).real();
-      moduli = {-eigen.eigenvalues()[i].real(), g.dot(acoustic(elastic, angle) * g)};
+      moduli = {-eigen.eigenvalues()[i].real(), g.dot(acoustic_tensor(elastic, n) * g)};
     }
   }
   return moduli;
@@ -89,13 +78,6 @@ double element_size(const Mesh& mesh) {
   return std::sqrt(area / static_cast<double>(mesh.elements.size()));
 }
 
-DoubleStiffness double_stiffness(const ElementParameters& e) {
-  if (e.mindlin.empty()) return one_parameter_law(e.D);
-  std::array<double, 5> a{};
-  std::copy_n(e.mindlin.begin(), 5, a.begin());
-  return mindlin_law(a);
-}
-
 bool is_volume_element(const Case& c) { return c.material.type == MaterialType::volume_element; }
 
 BandModuli moduli_of(const Case& c) {
@@ -104,7 +86,7 @@ BandModuli moduli_of(const Case& c) {
 
 void warn_of_coarse_mesh(const Case& c, const Mesh& mesh, const BandModuli& moduli, std::vector<std::string>& out) {
   if (c.element.type != ElementType::second_gradient || moduli.softening == 0) return;
-  const double D = band_modulus(double_stiffness(c.element)), size = element_size(mesh);
+  const double D = band_modulus(make_double_stiffness(c.element)), size = element_size(mesh);
   const double width = expected_band_width(D, moduli);
   if (width >= kElementsForForce * size) return;
   out.push_back(fmt::format(
