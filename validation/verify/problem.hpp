@@ -12,6 +12,13 @@
 
 namespace femxdem {
 
+/// The closed forms are those of small strain: they are compared in the limit of displacements scaled by this.
+inline constexpr double kSmall = 1e-6;
+
+/// Elasticity of the closed forms, lambda = G = 400.
+inline const ElasticLaw kElastic{1000, 0.25, 0};
+inline constexpr double kG = 400, kLambda = 400;
+
 /// A boundary value problem with laws in closed form, put together by hand: u and v prescribed node by node, in
 /// proportion to the time, which goes from 0 to 1.
 class Problem {
