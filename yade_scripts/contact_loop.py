@@ -61,13 +61,13 @@ def norms(c, name):
 
 
 # Pairs (i, j), i <= j, of a symmetric tensor's six components, and each component's place in them.
-_I, _J = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
+I, J = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
 PLACE = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
 def fabric(c, weight):
     """sum_c weight n_i n_j, (6,) in the order xx, yy, zz, xy, yz, zx."""
-    return weight @ (c.normal[:, _I] * c.normal[:, _J])
+    return weight @ (c.normal[:, I] * c.normal[:, J])
 
 
 def stiffness(c, kn, kt, volume):
@@ -77,7 +77,7 @@ def stiffness(c, kn, kt, volume):
     kn, kt (m,) [N/m]; volume of the cell [m^3].
     """
     l2 = c.length**2 / volume
-    nn = c.normal[:, _I] * c.normal[:, _J]
+    nn = c.normal[:, I] * c.normal[:, J]
     C = (nn.T @ (((kn - kt) * l2)[:, None] * nn))[PLACE[:, :, None, None], PLACE]
     G = 0.25 * fabric(c, kt * l2)[PLACE]
     d = np.eye(3)

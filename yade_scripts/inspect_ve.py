@@ -101,8 +101,7 @@ def write_stiffness(packing, file):
         C = out.reshape(3, 3, 3, 3)
         K = np.einsum("iikk", C) / 9
         G = (np.einsum("ijij", C) - 3 * K) / 10
-        i, j = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
-        matrix = C[i[:, None], j[:, None], i, j].tolist()
+        matrix = C[contact_loop.I[:, None], contact_loop.J[:, None], contact_loop.I, contact_loop.J].tolist()
         found[name] = {"bulk_modulus": K, "shear_modulus": G, "seconds": seconds, "stiffness": matrix}
         print(f"{name} stiffness: bulk modulus {K:.4g} Pa, shear modulus {G:.4g} Pa, found in {seconds:.3f} s")
     if len(found) == 2:
