@@ -127,7 +127,7 @@ PythonVolumeElements::Plan PythonVolumeElements::plan(std::size_t index, const T
   const double rate = options_.inertial_number / reference_time_scale_[index];
   const long needed = std::max<long>(options_.min_steps, std::lround(std::ceil(size / (rate * slot.info.time_step))));
   long& steps = frozen_steps_[index];
-  if (steps == 0 || needed > 2 * steps) steps = needed;
+  if (!options_.freeze_steps || steps == 0 || needed > 2 * steps) steps = needed;
   slot.steps = steps;
   const RowMajor2 L = expm1(increment / static_cast<double>(steps)) / slot.info.time_step;
   std::copy_n(L.data(), 9, slot.velocity_gradient.begin());

@@ -14,6 +14,7 @@ namespace femxdem {
 struct VolumeElementOptions {
   double inertial_number = 5e-3;      ///< I = rate a sqrt(rho / p) of a trial [-]
   int min_steps = 10;                 ///< least DEM steps of a trial that strains
+  bool freeze_steps = true;           ///< a load step's trials take as many DEM steps as its first
   double max_unbalanced_force = 0.2;  ///< an answer above is refused [-]
   double max_increment = 0.2;         ///< largest |ln U_inc| of one trial [-]
   bool relaxed = false;               ///< the elastic stiffness is the relaxed one, not Eq. (2)

@@ -87,6 +87,7 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   VolumeElementOptions options;
   options.inertial_number = ve.inertial_number;
   options.min_steps = ve.min_steps;
+  options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
   options.relaxed = ve.stiffness == VeStiffness::relaxed;
   options.serialise = ve.snapshot == Snapshot::serialise;

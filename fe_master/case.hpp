@@ -89,6 +89,7 @@ struct VeParameters {
   double inertial_number = 5e-3;                  ///< I = rate a sqrt(rho / p) of a trial [-]
   double time_step_safety = 0.8;                  ///< DEM time step / critical one [-]
   int min_steps = 10;                             ///< least DEM steps of a trial that strains
+  bool freeze_steps = true;                       ///< the DEM steps of a load step's trials are those of its first
   double max_unbalanced_force = 0.2;              ///< an answer above is refused [-]
   NewContacts new_contacts = NewContacts::frictional;
   VeStiffness stiffness = VeStiffness::affine;
@@ -162,6 +163,7 @@ struct SolverParameters {
   double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
   double qn_max = 1.2;
   double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
+  double qn_first = 0.5;         ///< weight of what a step's first trial teaches against the committed state [-]
   double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
   double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;       ///< of the step that goes beyond this time [s]

@@ -162,6 +162,8 @@ Section<VeParameters> ve_section() {
            parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
            parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
            parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
+           parameter("freeze_steps", &V::freeze_steps, "", kAny,
+                     "the DEM steps of a load step's trials are those of its first; false: for comparison only"),
            parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
                      "an answer above is refused as unstable"),
            word("stiffness", &V::stiffness, {"affine", "relaxed"},
@@ -247,6 +249,8 @@ Section<SolverParameters> solver_section() {
        parameter("qn_min", &S::qn_min, "", kAny, "learned tangent: least eigenvalue, elastic metric"),
        parameter("qn_max", &S::qn_max, "", kPositive, "learned tangent: largest eigenvalue, elastic metric"),
        parameter("qn_skew", &S::qn_skew, "", kNotNegative, "learned tangent: norm of the skew part, elastic metric"),
+       parameter("qn_first", &S::qn_first, "", {0.0, 1.0},
+                 "learned tangent: weight of what a step's first trial teaches against the step's start"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
                  "random start of one step / its displacement: finds other solutions"),
@@ -341,8 +345,8 @@ const CaseSections& case_sections() {
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
     s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"stiffness", "snapshot", "inertial_number", "min_steps", "max_unbalanced_force", "seeds",
-                             "assignment", "assignment_seed", "cache"});
+                            {"stiffness", "snapshot", "inertial_number", "min_steps", "freeze_steps",
+                             "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
     return s;
   }();
   return sections;

@@ -125,6 +125,7 @@ void LearnedTangent::begin_step(const Tensor2& F, const Tensor2& stress) {
   U_n_ = U;
   strain_ = MandelVector::Zero(static_cast<int>(components_.size()));
   stress_ = unrotated(stress, R);
+  first_ = true;
 }
 
 MandelVector LearnedTangent::strain(const Tensor2& U) const {
@@ -142,7 +143,8 @@ void LearnedTangent::learn(const Tensor2& F, const Tensor2& stress) {
   if (s.norm() < limits_.noise) return;
   strain_ += s;
   stress_ += y;
-  C_ += (y - C_ * s) * s.transpose() / s.squaredNorm();
+  C_ += (first_ ? limits_.first : 1) * (y - C_ * s) * s.transpose() / s.squaredNorm();
+  first_ = false;
   bound();
 }
 

@@ -37,6 +37,7 @@ struct LearningLimits {
   double min = 0.02;    ///< least eigenvalue of its symmetric part in the elastic metric [-]
   double max = 1.2;     ///< largest one [-]
   double skew = 0.6;    ///< largest norm of its skew part [-]
+  double first = 1;     ///< weight of the first pair of a step: from the committed state to the first trial [-]
   double noise = 1e-6;  ///< change of strain below which nothing is learned [-]
 };
 
@@ -48,9 +49,11 @@ struct StrainProbe {
 };
 
 /// Tangent of one material point, learned from the responses that it has given: elastic at first, then a rank-one
-/// secant update from each pair of successive trials, C <- C + (y - C s) s^T / (s^T s), kept between steps. It lives in
-/// the frame of the stretch, s = sym(U U_n^-1) and y = R^T sigma R, so that objectivity is exact; bounded in the
-/// elastic metric. (Broyden 1965; partitioned as in Griewank and Toint 1982, a Gauss point being a partition.)
+/// secant update from each pair of successive trials, C <- C + w (y - C s) s^T / (s^T s), kept between steps; w = 1,
+/// but for the first pair of a step: what a trial's end moves by when its strain moves is not what a whole increment
+/// does to a volume element, whose stress follows the rate of strain too. It lives in the frame of the stretch, s =
+/// sym(U U_n^-1) and y = R^T sigma R, so that objectivity is exact; bounded in the elastic metric. (Broyden 1965;
+/// partitioned as in Griewank and Toint 1982, a Gauss point being a partition.)
 class LearnedTangent {
  public:
   LearnedTangent(const Tensor4& elastic, const StrainComponents& components, const LearningLimits& limits);
@@ -84,6 +87,7 @@ class LearnedTangent {
   MandelMatrix C_;
   Tensor2 U_n_ = Tensor2::Identity();
   MandelVector strain_, stress_;  // of the last trial, in the frame of the stretch
+  bool first_ = true;             // the next pair starts from the committed state
 };
 
 }  // namespace femxdem

@@ -5,7 +5,6 @@ can, and the geometry comes from the positions of the bodies, which YADE hands o
 """
 
 from dataclasses import dataclass
-from itertools import chain
 from operator import attrgetter, methodcaller
 
 import numpy as np
@@ -26,22 +25,25 @@ def contacts(O):
     from yade._utils import coordsAndDisplacements
 
     pairs = list(O.interactions)
-    ids = np.fromiter(chain.from_iterable(map(attrgetter("id1", "id2"), pairs)), int, 2 * len(pairs)).reshape(-1, 2)
-    x = np.array([coordsAndDisplacements(axis)[0] for axis in range(3)])
-    if x.shape[1] != len(O.bodies):
+    ids = np.empty((2, len(pairs)), dtype=int)
+    for row, name in zip(ids, ("id1", "id2")):
+        row[:] = np.fromiter(map(attrgetter(name), pairs), int, len(pairs))
+    phys = list(map(attrgetter("phys"), pairs))
+    x = np.column_stack([coordsAndDisplacements(axis)[0] for axis in range(3)])
+    if len(x) != len(O.bodies):
         x = _positions_by_id(O)
     H = np.array(O.cell.hSize).reshape(3, 3)
-    branch = x[:, ids[:, 1]] - x[:, ids[:, 0]]
-    branch -= H @ np.round(np.linalg.solve(H, branch))
-    length = np.sqrt((branch * branch).sum(axis=0))
-    return Contacts(ids, (branch / length).T, length, list(map(attrgetter("phys"), pairs)))
+    branch = x.take(ids[1], axis=0) - x.take(ids[0], axis=0)
+    branch -= np.round(branch @ np.linalg.inv(H).T) @ H.T
+    length = np.sqrt(np.einsum("ci,ci->c", branch, branch))
+    return Contacts(ids.T, branch / length[:, None], length, phys)
 
 
 def _positions_by_id(O):
-    """(3, n) positions when bodies have been erased, NaN in their place."""
-    x = np.full((3, len(O.bodies)), np.nan)
+    """(n, 3) positions when bodies have been erased, NaN in their place."""
+    x = np.full((len(O.bodies), 3), np.nan)
     for b in O.bodies:
-        x[:, b.id] = b.state.pos
+        x[b.id] = b.state.pos
     return x
 
 

@@ -113,6 +113,21 @@ TEST(LearnedTangent, AnswersTheLastIncrementAsThePointDid) {
   EXPECT_LT((matrix_of(learned) * s - 0.6 * to_mandel(kC, kPlaneStrain) * s).norm(), 1e-12);
 }
 
+TEST(LearnedTangent, LearnsAsMuchAsAskedFromTheFirstTrialOfAStep) {
+  LearnedTangent learned(kC, kPlaneStrain, {.first = 0.25});
+  const MandelMatrix C0 = to_mandel(kC, kPlaneStrain);
+  const Tensor2 e = strain(1e-3, -2e-3, 5e-4), further = strain(1e-3, -2e-3, 1e-3);
+  const MandelVector s = to_mandel(e, kPlaneStrain), t = to_mandel(Tensor2(further - e), kPlaneStrain);
+  teach(learned, e, 0.6);
+  EXPECT_LT((matrix_of(learned) * s - 0.9 * C0 * s).norm(), kRoundOff * kC.norm());
+  teach(learned, further, 0.6);
+  EXPECT_LT((matrix_of(learned) * t - 0.6 * C0 * t).norm(), kRoundOff * kC.norm());
+  learned.begin_step(Tensor2::Identity(), Tensor2::Zero());
+  const MandelVector before = matrix_of(learned) * s;
+  teach(learned, e, 0.6);
+  EXPECT_LT((matrix_of(learned) * s - (0.75 * before + 0.15 * C0 * s)).norm(), kRoundOff * kC.norm());
+}
+
 TEST(LearnedTangent, ThreeOrthogonalIncrementsTeachALinearLaw) {
   LearnedTangent learned(kC, kPlaneStrain, {});
   Tensor2 e = Tensor2::Zero();
