@@ -5,6 +5,8 @@ engines of their own stay too. Whatever strains, stops, records or calls back is
 cell from then on.
 """
 
+from contact_laws import resting_time_step
+
 KEPT = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
 DROPPED = (  # with everything derived from them
     "BoundaryController",  # PeriTriaxController, Peri3dController, PeriIsoCompressor, ...
@@ -93,8 +95,9 @@ def _reset(O, integrator):
     if O.cell.velGrad != Matrix3.Zero or O.cell.nextVelGrad != Matrix3.Zero:
         done.append("velocity gradient of the cell set to zero")
         O.cell.velGrad = Matrix3.Zero
-    O.dt = 0.0
+    O.dt = resting_time_step(O)
     O.step()  # YADE applies a new velocity gradient in the integrator: one step that takes no time
+    O.dt = 0.0
     done.append("velocities of the grains set to zero")
     calm()
     if O.cell.trsf != Matrix3.Identity:

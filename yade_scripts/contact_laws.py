@@ -19,6 +19,11 @@ import math
 LAWS = ("adhesive", "bonded", "friction")
 NEW_CONTACTS = ("frictional", "adhesive")
 EVERY = 4  # DEM steps between two looks for new contacts
+FINITE_WITHOUT_TIME = {
+    "Law2_ScGeom_FrictPhys_CundallStrack",
+    "Law2_ScGeom6D_CohFrictPhys_CohesionMoment",
+    "Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM",
+}
 TAG = "femxdem_adhesion_of_new_contacts"
 
 
@@ -101,6 +106,14 @@ def run(O, steps, new_adhesion):
         if new_adhesion and O.iter % EVERY == 0:
             since = O.iter - 2 * EVERY
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal > since], *new_adhesion)
+
+
+def resting_time_step(O):
+    """Time step [s] in which the contact forces of the scene are found again without a slip: none, so that they are the
+    same to the bit; a billionth of O.dt for laws that may divide by it (Hertz-Mindlin's does, and answers nan)."""
+    loop = next(e for e in O.engines if type(e).__name__ == "InteractionLoop")
+    laws = {type(f).__name__ for f in loop.lawDispatcher.functors}
+    return 0.0 if laws <= FINITE_WITHOUT_TIME else 1e-9 * O.dt
 
 
 def sliding_without_normal_force(interactions):

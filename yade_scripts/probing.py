@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 
+from contact_laws import resting_time_step
 from contact_loop import PLACE
 
 STRAIN = 1e-7  # each way; overlaps are thousands of times larger
@@ -37,7 +38,7 @@ def _probed(O, stress, to_forces):
     from yade._utils import calm
     from yade.utils import Matrix3
 
-    short = SHORT * O.dt
+    short, rest = SHORT * O.dt, resting_time_step(O)
 
     def strain(L, dt):
         O.cell.velGrad, O.dt = Matrix3(*L.ravel()), dt
@@ -47,7 +48,7 @@ def _probed(O, stress, to_forces):
         """Stress after the strain L * short, without velocities: viscous forces are none of the stiffness."""
         strain(L, short)
         to_forces()
-        strain(np.zeros((3, 3)), 0.0)
+        strain(np.zeros((3, 3)), rest)
         calm()
         to_forces()
         s = stress()

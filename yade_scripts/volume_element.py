@@ -106,9 +106,9 @@ class Engine:
         self._select(ve)
         O = self.O
         O.stringToScene(state)
-        O.forces.reset()
+        O.forces.reset(False)  # resetting permanent forces as well crashes YADE where bodies have been erased
         without = contact_laws.sliding_without_normal_force(O.interactions)
-        time_step, O.dt = O.dt, 0.0
+        time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         self._to_forces()
         contact_laws.take_normal_force(O.forces, without)
