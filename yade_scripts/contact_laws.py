@@ -25,6 +25,7 @@ FINITE_WITHOUT_TIME = {
     "Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM",
 }
 TAG = "femxdem_adhesion_of_new_contacts"
+STIFFNESS_TAG = "femxdem_constant_stiffness"
 
 
 def engines(law, kn, kt, damping):
@@ -85,6 +86,16 @@ def add_adhesion(law, interactions, f_c, friction):
         p.cohesionBroken, p.fragile = False, law == "bonded"
         count += 1
     return count
+
+
+def note_constant_stiffness(O, kn, kt):
+    """Notes in the scene that every contact, now and later, has kn and kt [N/m]."""
+    O.tags[STIFFNESS_TAG] = f"{kn!r} {kt!r}"
+
+
+def constant_stiffness(O):
+    """(kn, kt) of the scene's note, or None."""
+    return tuple(map(float, O.tags[STIFFNESS_TAG].split())) if STIFFNESS_TAG in O.tags.keys() else None
 
 
 def make_new_contacts_adhesive(O, f_c, friction):

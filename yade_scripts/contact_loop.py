@@ -5,9 +5,12 @@ can, and the geometry comes from the positions of the bodies, which YADE hands o
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from operator import attrgetter, methodcaller
 
 import numpy as np
+
+import contact_laws
 
 
 @dataclass
@@ -17,7 +20,12 @@ class Contacts:
     ids: np.ndarray  # (m, 2) bodies
     normal: np.ndarray  # (m, 3) unit, along the branch vector
     length: np.ndarray  # (m,) of the branch vector [m]
-    phys: list  # YADE's objects with the stiffnesses and forces
+    pairs: list  # YADE's objects
+
+    @cached_property
+    def phys(self):
+        """YADE's objects with the stiffnesses and forces."""
+        return list(map(attrgetter("phys"), self.pairs))
 
 
 def contacts(O):
@@ -28,7 +36,6 @@ def contacts(O):
     ids = np.empty((2, len(pairs)), dtype=int)
     for row, name in zip(ids, ("id1", "id2")):
         row[:] = np.fromiter(map(attrgetter(name), pairs), int, len(pairs))
-    phys = list(map(attrgetter("phys"), pairs))
     x = np.column_stack([coordsAndDisplacements(axis)[0] for axis in range(3)])
     if len(x) != len(O.bodies):
         x = _positions_by_id(O)
@@ -36,7 +43,7 @@ def contacts(O):
     branch = x.take(ids[1], axis=0) - x.take(ids[0], axis=0)
     branch -= np.round(branch @ np.linalg.inv(H).T) @ H.T
     length = np.sqrt(np.einsum("ci,ci->c", branch, branch))
-    return Contacts(ids.T, branch / length[:, None], length, phys)
+    return Contacts(ids.T, branch / length[:, None], length, pairs)
 
 
 def _positions_by_id(O):
@@ -49,7 +56,15 @@ def _positions_by_id(O):
 
 def has_stiffness(c):
     """Whether the contacts' physics know their stiffnesses kn and ks."""
-    return bool(c.phys) and hasattr(c.phys[0], "kn") and hasattr(c.phys[0], "ks")
+    return bool(c.pairs) and all(hasattr(c.pairs[0].phys, name) for name in ("kn", "ks"))
+
+
+def stiffnesses(O, c):
+    """kn and ks of the contacts, (m,) each [N/m]; not read one by one in a packing whose contacts are all alike."""
+    constant = contact_laws.constant_stiffness(O)
+    if constant and np.allclose(constant, (c.pairs[0].phys.kn, c.pairs[0].phys.ks), rtol=1e-12, atol=0):
+        return tuple(np.full(len(c.pairs), k) for k in constant)
+    return values(c, "kn"), values(c, "ks")
 
 
 def values(c, name):

@@ -87,6 +87,7 @@ def _loose_cell(O, p, kn, radii, small_radii, rng):
     O.cell.hSize = Matrix3(side, 0, 0, 0, side, 0, 0, 0, side)
     law, kt = p["contact_law"], kn / p["stiffness_ratio"]
     O.engines = contact_laws.engines(law, kn, kt, COMPACTION_DAMPING)
+    contact_laws.note_constant_stiffness(O, kn, kt)
     for x, r in zip(_random_positions(rng, radii, side), small_radii):
         mat = contact_laws.material(law, kn, kt, r, p["density"], p["compaction_friction"])
         O.bodies.append(sphere(tuple(x), r, material=mat))

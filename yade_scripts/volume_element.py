@@ -177,7 +177,7 @@ class Engine:
         self._select(ve)
         c, volume = contact_loop.contacts(self.O), self.O.cell.volume
         if contact_loop.has_stiffness(c) and not self._grains[ve].clumped:
-            kn, kt = contact_loop.values(c, "kn"), contact_loop.values(c, "ks")
+            kn, kt = contact_loop.stiffnesses(self.O, c)
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)
         elif not relaxed:

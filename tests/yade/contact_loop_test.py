@@ -60,6 +60,15 @@ class Stiffness(unittest.TestCase):
         ours = contact_loop.stiffness(c, kn, kt, V)
         np.testing.assert_allclose(ours, C, rtol=0, atol=1e-12 * np.abs(C).max())
 
+    def test_noted_stiffnesses_are_those_of_the_contacts(self):
+        for spec in (SPEC, ADHESIVE):
+            O, c, kn, kt = sheared(spec)
+            noted = contact_loop.stiffnesses(O, c)
+            self.assertEqual([len(set(k)) for k in noted], [1, 1])
+            np.testing.assert_allclose(noted, (kn, kt), rtol=1e-12, atol=0)
+        c.phys[0].kn *= 2
+        np.testing.assert_array_equal(contact_loop.stiffnesses(O, c)[0], contact_loop.values(c, "kn"), "not as noted: read")
+
     def test_isotropic_packing_has_the_voigt_moduli(self):
         """K = N <l^2> kn/(9 V), G = N <l^2> (2 kn + 3 kt)/(30 V)."""
         ve = element(SPEC)
