@@ -163,7 +163,7 @@ struct SolverParameters {
   double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
   double qn_max = 1.2;
   double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
-  double qn_first = 0.5;         ///< weight of what a step's first trial teaches against the committed state [-]
+  double qn_first = kNotGiven;   ///< weight of what a step's first trial teaches against the committed state [-]
   double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
   double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;       ///< of the step that goes beyond this time [s]

@@ -249,8 +249,9 @@ Section<SolverParameters> solver_section() {
        parameter("qn_min", &S::qn_min, "", kAny, "learned tangent: least eigenvalue, elastic metric"),
        parameter("qn_max", &S::qn_max, "", kPositive, "learned tangent: largest eigenvalue, elastic metric"),
        parameter("qn_skew", &S::qn_skew, "", kNotNegative, "learned tangent: norm of the skew part, elastic metric"),
-       parameter("qn_first", &S::qn_first, "", {0.0, 1.0},
-                 "learned tangent: weight of what a step's first trial teaches against the step's start"),
+       parameter(
+           "qn_first", &S::qn_first, "", {0.0, 1.0},
+           "weight of what a step's first trial teaches against its start; default 0 for volume elements, else 1"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
                  "random start of one step / its displacement: finds other solutions"),

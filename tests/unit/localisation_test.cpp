@@ -89,7 +89,6 @@ TEST(Localisation, OperatorsTellItOfTheirTangents) {
   const std::vector<Response> reference = points.evaluate(start, Operator::elastic);
   SolverParameters parameters;
   parameters.global_operator = GlobalOperator::quasi_newton;
-  parameters.qn_first = 1;
   PointOperators learned(parameters, reference);
   EXPECT_NEAR(learned.acoustic_determinants(start, reference).at(0), 1, 1e-12);
   parameters.global_operator = GlobalOperator::tangent;

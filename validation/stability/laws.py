@@ -63,10 +63,10 @@ def elastic_operator(program):
 
 def large_increments(program):
     """Increments too large at the peak, with and without cutting."""
-    case, settings = "../solver/biaxial_law.toml", ("control.step=0.2", "control.max_step=0.2", "control.end_time=0.4")
-    whole = program.run(case, "no_cutting", "control.min_step=0.2", *settings)
+    case, settings = "../solver/biaxial_law.toml", ("control.step=0.1", "control.end_time=0.4")
+    whole = program.run(case, "no_cutting", "control.min_step=0.1", *settings)
     cut = program.run(case, "cutting", *settings)
-    return Row(f"without cutting (min_step = step = 1e-2 of strain): exit status {whole.status} at {whole.history()['time'][-1]:.2g} s, "
+    return Row(f"without cutting (min_step = step = 5e-3 of strain): exit status {whole.status} at {whole.history()['time'][-1]:.2g} s, "
                f"{whole.reason()}; its {whole.steps()} steps are kept",
                f"default min_step: {cut.rejected()} attempts rejected and cut, end reached, exit status {cut.status}, "
                f"{cut.evaluations()} evaluations in {cut.steps()} steps",
