@@ -19,8 +19,7 @@ bool all_answered(std::span<const Response> responses) {
 PointOperators::PointOperators(const SolverParameters& parameters, std::span<const Response> reference)
     : parameters_(parameters), F_n_(reference.size(), Tensor2::Identity()) {
   const double first = is_given(parameters.qn_first) ? parameters.qn_first : 1;
-  const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, first,
-                              parameters.qn_noise};
+  const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, first, parameters.qn_noise};
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
     elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));
