@@ -70,8 +70,9 @@ void PathDriver::begin_segment(const PathSegment& segment) {
   response_ = point_.evaluate(std::array{F_}, Operator::elastic).front();
   if (response_.failure) throw UserError(response_.failure->sentence + " " + response_.failure->advice);
   R_ = polar_decomposition(F_).R;
-  tangent_.emplace(rotate(response_.stiffness, R_.transpose()), kAllComponents,
-                   LearningLimits{parameters_.qn_min, parameters_.qn_max, parameters_.qn_skew, 1, parameters_.qn_noise});
+  tangent_.emplace(
+      rotate(response_.stiffness, R_.transpose()), kAllComponents,
+      LearningLimits{parameters_.qn_min, parameters_.qn_max, parameters_.qn_skew, 1, parameters_.qn_noise});
   segment_ = segment;
   F_start_ = F_;
   E_start_ = path_strain(F_);
