@@ -24,7 +24,7 @@ FINITE_WITHOUT_TIME = {
     "Law2_ScGeom6D_CohFrictPhys_CohesionMoment",
     "Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM",
 }
-TAG = "femxdem_adhesion_of_new_contacts"
+ADHESION_TAG = "femxdem_adhesion_of_new_contacts"
 STIFFNESS_TAG = "femxdem_constant_stiffness"
 
 
@@ -90,22 +90,30 @@ def add_adhesion(law, interactions, f_c, friction):
 
 def note_constant_stiffness(O, kn, kt):
     """Notes in the scene that every contact, now and later, has kn and kt [N/m]."""
-    O.tags[STIFFNESS_TAG] = f"{kn!r} {kt!r}"
+    _note(O, STIFFNESS_TAG, kn, kt)
 
 
 def constant_stiffness(O):
     """(kn, kt) of the scene's note, or None."""
-    return tuple(map(float, O.tags[STIFFNESS_TAG].split())) if STIFFNESS_TAG in O.tags.keys() else None
+    return _noted(O, STIFFNESS_TAG)
 
 
 def make_new_contacts_adhesive(O, f_c, friction):
     """Notes in the scene, with which it is saved, that contacts formed from now on get the adhesion f_c [N]."""
-    O.tags[TAG] = f"{f_c!r} {friction!r}"
+    _note(O, ADHESION_TAG, f_c, friction)
 
 
 def adhesion_of_new_contacts(O):
     """(f_c [N], friction) of the scene's note, or None."""
-    return tuple(map(float, O.tags[TAG].split())) if TAG in O.tags.keys() else None
+    return _noted(O, ADHESION_TAG)
+
+
+def _note(O, tag, *numbers):
+    O.tags[tag] = " ".join(map(repr, numbers))
+
+
+def _noted(O, tag):
+    return tuple(map(float, O.tags[tag].split())) if tag in O.tags.keys() else None
 
 
 def run(O, steps, new_adhesion):

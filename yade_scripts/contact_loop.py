@@ -33,9 +33,7 @@ def contacts(O):
     from yade._utils import coordsAndDisplacements
 
     pairs = list(O.interactions)
-    ids = np.empty((2, len(pairs)), dtype=int)
-    for row, name in zip(ids, ("id1", "id2")):
-        row[:] = np.fromiter(map(attrgetter(name), pairs), int, len(pairs))
+    ids = np.array([np.fromiter(map(attrgetter(name), pairs), int, len(pairs)) for name in ("id1", "id2")])
     x = np.column_stack([coordsAndDisplacements(axis)[0] for axis in range(3)])
     if len(x) != len(O.bodies):
         x = _positions_by_id(O)

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from contact_loop import I, J
 from volume_element import Engine
 
 FIELDS = (
@@ -41,6 +42,19 @@ def measure(ve):
     stress, report, stretch = np.full(9, np.nan), np.full(len(FIELDS), np.nan), np.full(9, np.nan)
     engine().measure(ve, stress, report, stretch)
     return stress.reshape(3, 3), dict(zip(FIELDS, report)), stretch.reshape(3, 3)
+
+
+def stiffness(ve, relaxed=False):
+    """Elastic stiffness (3, 3, 3, 3)."""
+    out = np.full(81, np.nan)
+    engine().stiffness(ve, out, relaxed)
+    return out.reshape(3, 3, 3, 3)
+
+
+def mandel(C):
+    """(6, 6) with the eigenvalues of C on symmetric tensors."""
+    w = np.where(I == J, 1.0, np.sqrt(2))
+    return C[I[:, None], J[:, None], I, J] * np.outer(w, w)
 
 
 def select(ve):

@@ -5,7 +5,7 @@ import unittest
 import numpy as np
 
 import contact_loop
-from cells import FRICTION, element, engine, measure, select
+from cells import FRICTION, element, engine, mandel, measure, select, stiffness
 
 KN, KT, A = 5e4, 2e4, 1e-3
 
@@ -28,19 +28,6 @@ def moduli(C):
     """Bulk and shear modulus of the isotropic part."""
     K = np.einsum("iikk", C) / 9
     return K, (np.einsum("ijij", C) - 3 * K) / 10
-
-
-def mandel(C):
-    """(6, 6) with the eigenvalues of C on symmetric tensors."""
-    i, j = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
-    w = np.where(i == j, 1.0, np.sqrt(2))
-    return C[i[:, None], j[:, None], i, j] * np.outer(w, w)
-
-
-def asked(ve, relaxed=False):
-    out = np.full(81, np.nan)
-    engine().stiffness(ve, out, relaxed)
-    return out.reshape(3, 3, 3, 3)
 
 
 class Lattice(unittest.TestCase):
@@ -76,7 +63,7 @@ class Packing(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.ve = element(FRICTION)
-        cls.affine, cls.relaxed = asked(cls.ve), asked(cls.ve, relaxed=True)
+        cls.affine, cls.relaxed = stiffness(cls.ve), stiffness(cls.ve, relaxed=True)
 
     def test_is_symmetric_positive_and_below_equation_2(self):
         A6, R6 = mandel(self.affine), mandel(self.relaxed)

@@ -6,7 +6,7 @@
 An adhesive packing is strained in increments of 1e-3 in plane strain (axial -1, lateral 0.6), each followed by H DEM steps at
 rest. From the states at 0.8, 1.4 and 3 % increments of other sizes are tried, back and forth, in forked processes: secant
 modulus of the axial stress over sigma_0. Noise: rest of a straight line through the stresses of five increments that
-differ by 2e-7, over the stress. A table on the terminal; two minutes of one core.
+differ by 2e-7, over the stress. A table on the terminal; one minute of one core.
 """
 
 import argparse
