@@ -62,6 +62,8 @@ struct RegionMaterial {
   MaterialParameters material;
 };
 
+/// Settings of speed against accuracy: validation/speed_accuracy has their errors.
+enum class VePreset { none, fast, balanced, accurate };
 enum class VeSource { prepare, scene, script };
 enum class ContactLaw { adhesive, bonded, friction };
 enum class NewContacts { frictional, adhesive };
@@ -69,6 +71,7 @@ enum class Snapshot { fork, serialise };
 enum class VeStiffness { affine, relaxed };
 enum class Assignment { same, random };
 struct VeParameters {
+  VePreset preset = VePreset::none;  ///< gives spheres and inertial_number where the case does not
   VeSource source = VeSource::prepare;
   std::string script;                  ///< user's YADE script, absolute path
   std::string scene;                   ///< saved YADE scene, absolute path

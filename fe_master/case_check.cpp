@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -332,6 +333,18 @@ void require_known(const std::string& name, const std::set<std::string>& known, 
                                         : fmt::format("the {}s are {}", noun, list)));
 }
 
+namespace {
+
+struct PresetSettings {
+  int spheres;
+  double inertial_number;
+};
+/// On the front of speed against accuracy as measured by validation/speed_accuracy.
+const std::map<VePreset, PresetSettings> kPresets = {
+    {VePreset::fast, {100, 1e-2}}, {VePreset::balanced, {1000, 1e-2}}, {VePreset::accurate, {1000, 5e-3}}};
+
+}  // namespace
+
 void complete_case(Case& c, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
@@ -339,14 +352,20 @@ void complete_case(Case& c, const Mistakes& m) {
   if (!is_given(c.solver.displacement_tolerance)) c.solver.displacement_tolerance = ve ? 0.1 : 1e-6;
   if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
   if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
-  const auto complete_ve = [&](VeParameters& v, bool cohesion_given) {
-    if (v.contact_law == ContactLaw::friction && !cohesion_given) v.cohesion = 0.0;
+  const auto complete_ve = [&](VeParameters& v, const auto& given) {
+    if (v.contact_law == ContactLaw::friction && !given("cohesion")) v.cohesion = 0.0;
+    if (v.preset != VePreset::none) {
+      const PresetSettings& preset = kPresets.at(v.preset);
+      if (!given("spheres")) v.spheres = preset.spheres;
+      if (!given("inertial_number")) v.inertial_number = preset.inertial_number;
+    }
     if (!v.cache.empty()) v.cache = (std::filesystem::path(c.file).parent_path() / v.cache).lexically_normal().string();
   };
-  const bool cohesion = m.has("ve.cohesion");
-  complete_ve(c.ve, cohesion);
+  const auto given = [&m](const std::string& key) { return m.has("ve." + key); };
+  complete_ve(c.ve, given);
   for (std::size_t i = 0; i < c.ve_regions.size(); ++i)
-    complete_ve(c.ve_regions[i].ve, cohesion || m.has(fmt::format("ve.region.{}.cohesion", i)));
+    complete_ve(c.ve_regions[i].ve,
+                [&](const std::string& key) { return given(key) || m.has(fmt::format("ve.region.{}.{}", i, key)); });
 }
 
 void check_case(const Case& c, Purpose purpose, Mistakes& m) {

@@ -137,7 +137,9 @@ Section<VeParameters> ve_section() {
   using V = VeParameters;
   return {"ve",
           "volume element (VE): a periodic cell of grains in YADE",
-          {word("source", &V::source, {"prepare", "scene", "script"},
+          {word("preset", &V::preset, {"", "fast", "balanced", "accurate"},
+                "gives spheres and inertial_number where they are not given: README of validation/speed_accuracy"),
+           word("source", &V::source, {"prepare", "scene", "script"},
                 "prepare: a packing by the numbers below; scene: a saved one; script: a user's YADE script"),
            path("script", &V::script, "YADE script, run unchanged, then adopted"),
            path("scene", &V::scene, "saved scene (.yade.gz, .xml.bz2), adopted"),
@@ -346,7 +348,7 @@ const CaseSections& case_sections() {
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
     s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"stiffness", "snapshot", "inertial_number", "min_steps", "freeze_steps",
+                            {"preset", "stiffness", "snapshot", "inertial_number", "min_steps", "freeze_steps",
                              "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
     return s;
   }();

@@ -196,6 +196,15 @@ TEST(Case, FrictionLawHasNoCohesionUnlessGiven) {
   EXPECT_EQ(read_case(kGood).ve.cohesion, 1.0);
 }
 
+TEST(Case, APresetGivesWhatTheCaseDoesNot) {
+  const Case fast = read_case(kGood, {"ve.preset=fast"});
+  const Case accurate = read_case(kGood, {"ve.preset=accurate"});
+  EXPECT_LT(fast.ve.spheres, accurate.ve.spheres);
+  EXPECT_GT(fast.ve.inertial_number, accurate.ve.inertial_number);
+  EXPECT_EQ(read_case(kGood, {"ve.preset=fast", "ve.spheres=321"}).ve.spheres, 321);
+  EXPECT_NE(mistakes_of(kGood, {"ve.preset=quick"}).find("balanced"), std::string::npos);
+}
+
 TEST(Load, FactorFollowsItsTableOrItsKind) {
   Load load;
   load.table = {{1.0, 0.0}, {2.0, 1.0}, {4.0, -1.0}};

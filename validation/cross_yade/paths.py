@@ -1,6 +1,7 @@
 """The paths on which one element and YADE alone are compared."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 
 CONFINING_STRESS = 1e5  # sigma_0 [Pa]
 INCREMENT = 1e-3  # of the element's driven strain
@@ -14,6 +15,13 @@ class Path:
     targets: tuple
     held: tuple = ()  #: axes whose stress is kept at -sigma_0
     strains: tuple = (0.0, 1.0, 0.0)  #: strain of each axis over the driven one, where no stress is held
+
+    def rate(self):
+        """Norm of the strain rate over the rate of the driven component; held axes: as if the volume were kept."""
+        if self.name == "simple_shear":
+            return math.sqrt(0.5)
+        lateral = -sum(self.strains[axis] for axis in range(3) if axis not in self.held) / max(1, len(self.held))
+        return math.hypot(*[lateral if axis in self.held else self.strains[axis] for axis in range(3)])
 
     def segments(self):
         """[[path]] tables of a case."""

@@ -27,7 +27,7 @@ from paths import CONFINING_STRESS, INCREMENT, PATHS
 HERE = Path(__file__).resolve().parent
 LAWS = {"cohesive": 'contact_law = "adhesive"\ncohesion = 1.0', "cohesionless": 'contact_law = "friction"\ncohesion = 0.0'}
 INERTIAL_NUMBER = 5e-3
-SERIES = ("element", "yade", "yade_half_rate")
+RATES = {"yade": 1.0, "yade_0.7_rate": 0.7, "yade_half_rate": 0.5}  # of YADE alone, over the element's
 STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_xy")
 
 CASE = """# Made by validation/cross_yade/run.py: the volume element of one packing on one path.
@@ -73,18 +73,18 @@ def packing(program, folder, law, seed, spheres):
 
 
 def compute(program, folder, law, seed, path, spheres):
-    """The three curves of one packing on one path, as files."""
+    """The curves of one packing on one path, as files."""
     case = case_file(folder, law, seed, path, spheres)
     log = folder / "log.txt"
     run = folder / "element" / case.stem
     if not done(run):
         sh([program, "ve", "path", case, "--out", run, "--overwrite"], log)
-    missing = [name for name in SERIES[1:] if not yade_curve(folder, case, name).exists()]
+    missing = [name for name in RATES if not yade_curve(folder, case, name).exists()]
     if not missing:
         return case
     state, manifest = packing(program, folder, law, seed, spheres)
     for name in missing:
-        rate = INERTIAL_NUMBER / manifest["time_scale"] / (2 if name == "yade_half_rate" else 1)
+        rate = INERTIAL_NUMBER / manifest["time_scale"] / path.rate() * RATES[name]
         curve = yade_curve(folder, case, name)
         curve.parent.mkdir(exist_ok=True)
         sh(["/usr/bin/python3", HERE / "yade_alone.py", state, path.name, rate, curve], log)
@@ -129,10 +129,12 @@ def distance(one, other):
     return rms(one[1] - other[1]) / rms(other[1]), rms((one[2] - other[2])[:, None])
 
 
-def table_row(curves):
-    """Distances of one packing on one path: element from YADE, YADE from itself at half the rate."""
-    element, yade, slow = (curves[name] for name in SERIES)
-    return distance(element, yade) + distance(element, slow) + distance(yade, slow)
+def distances(curves):
+    """(pairs, 2) distances of one packing on one path, of stress and of volumetric strain: of the element from YADE at each
+    rate, and of YADE from itself at each two rates, those of the full and of half the rate last."""
+    element = np.array([distance(curves["element"], curves[name]) for name in RATES])
+    fast, middle, slow = (curves[name] for name in RATES)
+    return element, np.array([distance(fast, middle), distance(middle, slow), distance(fast, slow)])
 
 
 def scatter(curves_of_seeds):
@@ -142,8 +144,9 @@ def scatter(curves_of_seeds):
     return np.mean([distance(c, mean) for c in yade], axis=0)
 
 
-HEADER = ("law", "path", "seed", "element_yade", "element_yade_volume", "element_slow_yade", "element_slow_yade_volume",
-          "yade_slow_yade", "yade_slow_yade_volume")
+HEADER = ("law", "path", "seed") + tuple(
+    f"{pair}{what}" for pair in ("element_yade", "element_0.7", "element_half", "yade_0.7", "0.7_half", "yade_half")
+    for what in ("", "_volume"))
 
 
 def write_tables(folder, results):
@@ -153,15 +156,15 @@ def write_tables(folder, results):
         writer.writerow(HEADER)
         for (law, name), curves_of_seeds in results.items():
             for seed, curves in curves_of_seeds.items():
-                writer.writerow([law, name, seed] + [f"{x:.3e}" for x in table_row(curves)])
-    lines = ["| law | path | element - YADE [%] | element - YADE at half rate [%] | YADE - YADE at half rate [%] | seeds [%] |",
-             "|---|---|---|---|---|---|"]
+                writer.writerow([law, name, seed] + [f"{x:.3e}" for x in np.concatenate(distances(curves)).ravel()])
+    lines = ["| law | path | element - YADE [%] | YADE - YADE [%] | ratio | element - YADE at the full rate [%] | YADE, full - half rate [%] "
+             "| seeds [%] |", "|---|---|---|---|---|---|---|---|"]
     for (law, name), curves_of_seeds in results.items():
-        rows = np.array([table_row(curves) for curves in curves_of_seeds.values()])
-        seeds = scatter(list(curves_of_seeds.values()))
-        pairs = list(100 * rows.mean(axis=0).reshape(3, 2)) + [100 * seeds]
-        volume = PATHS[name].held
-        text = [f"{s:.2f} ({v:.3f})" if volume else f"{s:.2f}" for s, v in pairs]
+        both = [distances(curves) for curves in curves_of_seeds.values()]
+        element, yade = (100 * np.mean([pair[k] for pair in both], axis=0) for k in (0, 1))
+        cells = [element.mean(axis=0), yade.mean(axis=0), element[0], yade[-1], 100 * scatter(list(curves_of_seeds.values()))]
+        text = [f"{s:.2f} ({v:.3f})" if PATHS[name].held else f"{s:.2f}" for s, v in cells]
+        text.insert(2, f"{element[:, 0].mean() / yade[:, 0].mean():.2f}")
         lines.append(f"| {law} | {name.replace('_', ' ')} | " + " | ".join(text) + " |")
     (folder / "table.md").write_text("\n".join(lines) + "\n")
 
@@ -210,9 +213,9 @@ def main():
     for law, name in rows_in_order(a.laws, a.paths):
         for seed in a.seeds:
             case = compute(program, folder, law, seed, PATHS[name], a.spheres)
-            curves = {series: curve(folder, case, series, PATHS[name]) for series in SERIES}
+            curves = {series: curve(folder, case, series, PATHS[name]) for series in ("element", *RATES)}
             results.setdefault((law, name), {})[seed] = curves
-            print(law, seed, name, " ".join(f"{x:.2e}" for x in table_row(curves)), flush=True)
+            print(law, seed, name, " ".join(f"{x:.2e}" for x in np.concatenate(distances(curves))[:, 0]), flush=True)
         write_tables(folder, results)
         draw(folder, results)
     print((folder / "table.md").read_text())

@@ -2,15 +2,20 @@
 """Solution strategies on one case: strategy x tolerance x increment, as a table and a figure.
 
     validation/solver/run.py [CASE.toml] [--ve] [--femxdem build/release/femxdem] [--out out/solver]
-                             [--strategies NAME ...] [--tolerances T ...] [--increments S ...] [--end SECONDS]
+                             [--strategies NAME ...] [--tolerances T ...] [--increments S ...] [--seeds N ...] [--end SECONDS]
+                             [--as-they-are]
 
 Without a case: biaxial_law.toml of this folder, a softening law in closed form (seconds a run); --ve: the same body on
-volume elements of 200 spheres, biaxial_ve.toml. An evaluation is one straining of every material point, those of
-rejected steps included; the peak is that of the first monitor.
+volume elements of 200 spheres, biaxial_ve.toml, half an hour to hours a run, one a seed. An evaluation is one straining of
+every material point, those of rejected steps included; the peak is that of the first monitor. Distances are those from the
+first run's of the same seed. Runs that have ended are not repeated; those that were interrupted are taken as far as they
+came with --as-they-are.
 """
 
 import argparse
 import csv
+import itertools
+import json
 import re
 import shutil
 import subprocess
@@ -36,22 +41,23 @@ STRATEGIES = {
 CLOSED_FORM_ONLY = {"newton", "newton_line_search"}
 
 
-def run(femxdem, case, folder, overrides):
-    """Rows of history.csv, rejected attempts by their reason, exit status."""
-    command = [femxdem, "run", case, "--out", folder, "--overwrite"]
-    for override in overrides:
-        command += ["--set", override]
-    status = subprocess.run(command, stdout=subprocess.DEVNULL).returncode
+def run(femxdem, case, folder, overrides, as_it_is):
+    """Rows of history.csv, rejected attempts by their reason."""
+    if not ((folder / "summary.json").exists() or as_it_is and (folder / "history.csv").exists()):
+        command = [femxdem, "run", case, "--out", folder, "--overwrite"]
+        for override in overrides:
+            command += ["--set", override]
+        subprocess.run(command, stdout=subprocess.DEVNULL)
     with open(folder / "history.csv") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     rejected = re.findall(r"rejected: (\w+)", (folder / "log.txt").read_text())
-    return rows, rejected, status
+    return rows, rejected
 
 
-def measure(rows, rejected, status, monitor, end):
+def measure(rows, rejected, monitor, end):
     """One line of the table: evaluations a step before and past the peak, and what went wrong."""
     if not rows:
-        return {"steps": 0, "failures": len(rejected), "status": status}
+        return {"steps": 0, "failures": len(rejected)}
     force = [abs(row[monitor]) for row in rows]
     peak = force.index(max(force))
     before, past = rows[: peak + 1], rows[peak + 1 :]
@@ -62,7 +68,7 @@ def measure(rows, rejected, status, monitor, end):
     return {"steps": len(rows), "before": mean(before), "past": mean(past), "most": max(row["evaluations"] for row in rows),
             "evaluations": sum(row["evaluations"] for row in rows), "failures": len(rejected),
             "smallest step": min(b["time"] - a["time"] for a, b in zip([{"time": 0}] + rows, rows)),
-            "reached": rows[-1]["time"] / end, "peak": max(force), "status": status}
+            "reached": rows[-1]["time"] / end, "peak": max(force)}
 
 
 def distance(rows, reference, monitor):
@@ -84,23 +90,24 @@ def distance(rows, reference, monitor):
 
 
 def table(lines):
-    head = ["strategy", "tolerance", "increment [s]", "before", "past", "most", "all", "failures", "smallest step [s]",
-            "of the way", "distance before", "distance past"]
+    head = ["strategy", "tolerance", "increment [s]", "seed", "mean", "before", "past", "most", "all", "failures", "smallest step [s]",
+            "of the way", "peak", "distance before", "distance past"]
     text = "| " + " | ".join(head) + " |\n|" + "---|" * len(head) + "\n"
-    for (name, tolerance, increment), m, (before, past) in lines:
+    for (name, tolerance, increment, seed), m, (before, past) in lines:
+        key = f"| {name} | {tolerance:g} | {increment:g} | {'' if seed is None else seed} | "
         if m["steps"] == 0:
-            text += f"| {name} | {tolerance:g} | {increment:g} | no step, {m['failures']} failures |\n"
+            text += key + f"no step, {m['failures']} failures |\n"
             continue
-        text += (f"| {name} | {tolerance:g} | {increment:g} | {m['before']:.2f} | {m['past']:.2f} | {m['most']:.0f} | "
-                 f"{m['evaluations']:.0f} | {m['failures']} | {m['smallest step']:.2g} | {100 * m['reached']:.0f} % | "
-                 f"{100 * before:.2f} % | {100 * past:.2f} % |\n")
+        text += key + (f"{m['evaluations'] / m['steps']:.2f} | {m['before']:.2f} | {m['past']:.2f} | {m['most']:.0f} | "
+                       f"{m['evaluations']:.0f} | {m['failures']} | {m['smallest step']:.2g} | {100 * m['reached']:.0f} % | "
+                       f"{m['peak']:.4g} | {100 * before:.2f} % | {100 * past:.2f} % |\n")
     return text
 
 
 def draw(curves, monitor, file):
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
-    for (name, tolerance, increment), rows in curves:
-        label = f"{name}, {tolerance:g}, {increment:g} s"
+    for (name, tolerance, increment, seed), rows in curves:
+        label = f"{name}, {tolerance:g}, {increment:g} s" + ("" if seed is None else f", seed {seed}")
         left.plot([r["time"] for r in rows], [abs(r[monitor]) for r in rows], label=label, linewidth=0.9)
         right.plot([r["time"] for r in rows], [r["evaluations"] for r in rows], ".-", linewidth=0.5, markersize=3)
     left.set(xlabel="time [s]", ylabel=f"|{monitor}|")
@@ -118,31 +125,37 @@ def main():
     parser.add_argument("--strategies", nargs="+", choices=STRATEGIES, default=list(STRATEGIES))
     parser.add_argument("--tolerances", nargs="+", type=float, default=[5e-3, 1e-3])
     parser.add_argument("--increments", nargs="+", type=float, default=[0.02])
-    parser.add_argument("--end", type=float, default=0.6)
-    arguments = parser.parse_args()
-    case = arguments.case or HERE / ("biaxial_ve.toml" if arguments.ve else "biaxial_law.toml")
+    parser.add_argument("--seeds", nargs="+", type=int, help="with --ve")
+    parser.add_argument("--end", type=float, help="0.6, with --ve 2 (10 %% of axial strain)")
+    parser.add_argument("--as-they-are", action="store_true")
+    a = parser.parse_args()
+    case = a.case or HERE / ("biaxial_ve.toml" if a.ve else "biaxial_law.toml")
     monitor = re.search(r'\[\[monitor\]\]\s*name = "(\w+)"', case.read_text()).group(1)
     closed_form = 'type = "volume_element"' not in case.read_text()
+    end = a.end or (2.0 if a.ve else 0.6)
+    seeds = [None] if closed_form else a.seeds or [1, 2, 3]
     lines, curves = [], []
-    for increment in arguments.increments:
-        for tolerance in sorted(arguments.tolerances):
-            for name in arguments.strategies:
-                if name in CLOSED_FORM_ONLY and not closed_form:
-                    continue
-                key = (name, tolerance, increment)
-                folder = arguments.out / f"{name}_{tolerance:g}_{increment:g}"
-                overrides = [f"solver.tolerance={tolerance}", f"control.step={increment}",
-                             f"control.end_time={arguments.end}", *STRATEGIES[name]]
-                rows, rejected, status = run(arguments.femxdem, case, folder, overrides)
-                curves.append((key, rows))
-                reference = curves[0][1]
-                lines.append((key, measure(rows, rejected, status, monitor, arguments.end),
-                              distance(rows, reference, monitor) if rows and reference else (0.0, 0.0)))
-                print(table(lines[-1:]).splitlines()[-1], flush=True)
-                if name == "quasi_newton":
-                    shutil.copy(folder / "history.csv", arguments.out / f"history_{tolerance:g}_{increment:g}.csv")
-    (arguments.out / "table.md").write_text(table(lines))
-    draw(curves, monitor, arguments.out / "strategies.png")
+    for increment, tolerance, name, seed in itertools.product(a.increments, sorted(a.tolerances), a.strategies, seeds):
+        if name in CLOSED_FORM_ONLY and not closed_form:
+            continue
+        key = (name, tolerance, increment, seed)
+        folder = a.out / "_".join([name, f"{tolerance:g}", f"{increment:g}"] + ([] if seed is None else [str(seed)]))
+        overrides = [f"solver.tolerance={tolerance}", f"control.step={increment}", f"control.max_step={increment}",
+                     f"control.end_time={end}", *STRATEGIES[name]]
+        if seed is not None:
+            overrides.append(f"ve.seed={seed}")
+        if not closed_form and increment < 0.01:
+            overrides.append("ve.min_steps=3")  # at 10 steps the rate of small increments is far below the case's
+        rows, rejected = run(a.femxdem, case, folder, overrides, a.as_they_are)
+        curves.append((key, rows))
+        reference = next(rows for other, rows in curves if other[3] == seed)
+        lines.append((key, measure(rows, rejected, monitor, end),
+                      distance(rows, reference, monitor) if rows and reference else (0.0, 0.0)))
+        print(table(lines[-1:]).splitlines()[-1], flush=True)
+        if name == "quasi_newton":
+            shutil.copy(folder / "history.csv", a.out / f"history_{folder.name}.csv")
+    (a.out / "table.md").write_text(table(lines))
+    draw(curves, monitor, a.out / "strategies.png")
 
 
 if __name__ == "__main__":
