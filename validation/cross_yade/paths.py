@@ -46,6 +46,7 @@ PATHS = {
         Path("triaxial_compression", (-0.05,), held=(0, 2)),
         Path("triaxial_extension", (0.03,), held=(0, 2)),
         Path("biaxial", (-0.05,), held=(0,)),
+        Path("biaxial_to_10", (math.log(0.9),), held=(0,)),
         Path("isotropic", (-0.01,), strains=(1.0, 1.0, 1.0)),
         Path("oedometric", (-0.03,)),
         Path("simple_shear", (0.1,)),

@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """One element driven by the finite-element master against YADE alone, on the same packings.
 
-    validation/cross_yade/run.py [--femxdem PROGRAM] [--out FOLDER] [--spheres N] [--seeds 1 2 3] [--paths NAME ...]
+    validation/cross_yade/run.py [--femxdem PROGRAM] [--out FOLDER] [--spheres N] [--seeds 1 2 3] [--laws NAME ...]
+                                 [--paths NAME ...] [--limit DISTANCE]
 
 Writes FOLDER/table.csv, table.md and cross_yade.png after every row (a law on a path, all seeds), those of the paper's
-case first; curves that are there already are not computed again.
+case first; curves that are there already are not computed again. Exit status 1 where an element is further from YADE alone
+than --limit.
 """
 
 import argparse
@@ -207,6 +209,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS))
     parser.add_argument("--paths", nargs="+", choices=PATHS, default=list(PATHS))
+    parser.add_argument("--limit", type=float, default=float("inf"), help="of the distance of stresses, relative")
     a = parser.parse_args()
     program, folder = Path(a.femxdem).resolve(), a.out.resolve()
     results = {}
@@ -219,6 +222,7 @@ def main():
         write_tables(folder, results)
         draw(folder, results)
     print((folder / "table.md").read_text())
+    return int(any(distances(c)[0][:, 0].max() > a.limit for seeds in results.values() for c in seeds.values()))
 
 
 if __name__ == "__main__":

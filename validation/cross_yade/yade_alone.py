@@ -5,7 +5,7 @@ gradient for simple shear. Nothing of femxdem takes part.
     yade_alone.py STATE PATH RATE CURVE.csv
 
 STATE is a file of the cache of `femxdem ve prepare`, PATH a name of paths.py, RATE [1/s] that of its driven component.
-CURVE.csv: logarithmic strains (simple shear: xy is gamma) and Cauchy stresses [Pa], tension positive, every 20 steps.
+CURVE.csv: logarithmic strains (simple shear: xy is gamma) and Cauchy stresses [Pa], tension positive, every 5 steps.
 """
 
 import csv
@@ -23,7 +23,7 @@ from yade.minieigenHP import Matrix3
 
 from paths import CONFINING_STRESS, PATHS
 
-EVERY = 20
+EVERY = 5
 O = y.Omega()
 
 
@@ -52,7 +52,7 @@ def follow(path, rate):
         if path.name == "simple_shear":
             O.cell.velGrad = Matrix3(0, direction * rate, 0, 0, 0, 0, 0, 0, 0)
         else:
-            controller(path, target, rate)
+            controller(path, target + 0.5 * (target - before), rate)
         component = 3 if path.name == "simple_shear" else 1
         while direction * (target - rows[-1][component]) > 1e-6:
             for _ in range(EVERY):
@@ -62,10 +62,11 @@ def follow(path, rate):
     return rows
 
 
-def controller(path, target, rate):
-    """PeriTriaxController: lateral stress kept where the path says so, strains driven at the rate."""
+def controller(path, aim, rate):
+    """PeriTriaxController: lateral stress kept where the path says so, strains driven at the rate towards `aim`, which lies
+    beyond the target: it slows down before what it aims at, and the stress relaxes."""
     mask = sum(1 << axis for axis in path.held)
-    goal = [-CONFINING_STRESS if axis in path.held else target * path.strains[axis] for axis in range(3)]
+    goal = [-CONFINING_STRESS if axis in path.held else aim * path.strains[axis] for axis in range(3)]
     speed = [5 * rate if axis in path.held else max(rate * abs(path.strains[axis]), 1e-9) for axis in range(3)]
     mass = sum(b.state.mass for b in O.bodies)  # of the cell wall; a stiffer one (dynCell=False) misses the stress by 50 %
     kept = [e for e in O.engines if not isinstance(e, y.PeriTriaxController)]
