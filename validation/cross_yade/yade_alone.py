@@ -43,21 +43,31 @@ def row():
     return strains + [s[0, 0], s[1, 1], s[2, 2], 0.5 * (s[0, 1] + s[1, 0])]
 
 
+def driven(path):
+    F = O.cell.trsf
+    return F[0, 1] if path.name == "simple_shear" else math.log(F[1, 1])
+
+
 def follow(path, rate):
-    """Rows along the path's targets of its driven component."""
+    """Rows along the path's targets of its driven component. A new direction acts one step after it is given: where the path
+    turns, it is given one step early, at a rate that comes to the target in whole steps."""
     rows = [row()]
     before = 0.0
     for target in path.targets:
-        direction = math.copysign(1.0, target - before)
+        way, turns = target - before, target != path.targets[-1]
+        speed = abs(way) / O.dt / math.ceil(abs(way) / (rate * O.dt)) if turns else rate
         if path.name == "simple_shear":
-            O.cell.velGrad = Matrix3(0, direction * rate, 0, 0, 0, 0, 0, 0, 0)
+            O.cell.velGrad = Matrix3(0, math.copysign(speed, way), 0, 0, 0, 0, 0, 0, 0)
         else:
-            controller(path, target + 0.5 * (target - before), rate)
-        component = 3 if path.name == "simple_shear" else 1
-        while direction * (target - rows[-1][component]) > 1e-6:
-            for _ in range(EVERY):
-                O.step()
-            rows.append(row())
+            controller(path, target + 0.5 * way, speed)
+        left = 1.5 * speed * O.dt if turns else 0.0
+        steps = 0
+        while math.copysign(1.0, way) * (target - driven(path)) > left:
+            O.step()
+            steps += 1
+            if steps == 1 or steps % EVERY == 0:
+                rows.append(row())
+        rows.append(row())
         before = target
     return rows
 

@@ -8,8 +8,8 @@
 Without a case: biaxial_law.toml of this folder, a softening law in closed form (seconds a run); --ve: the same body on
 volume elements of 200 spheres, biaxial_ve.toml, half an hour to hours a run, one a seed. An evaluation is one straining of
 every material point, those of rejected steps included; the peak is that of the first monitor. Distances are those from the
-first run's of the same seed. Runs that have ended are not repeated; those that were interrupted are taken as far as they
-came with --as-they-are.
+first run's of the same seed. Runs that have ended are not repeated; with --as-they-are none is started and those that
+were interrupted are taken as far as they came.
 """
 
 import argparse
@@ -43,7 +43,7 @@ CLOSED_FORM_ONLY = {"newton", "newton_line_search"}
 
 def run(femxdem, case, folder, overrides, as_it_is):
     """Rows of history.csv, rejected attempts by their reason."""
-    if not ((folder / "summary.json").exists() or as_it_is and (folder / "history.csv").exists()):
+    if not (as_it_is or (folder / "summary.json").exists()):
         command = [femxdem, "run", case, "--out", folder, "--overwrite"]
         for override in overrides:
             command += ["--set", override]
@@ -146,6 +146,8 @@ def main():
             overrides.append(f"ve.seed={seed}")
         if not closed_form and increment < 0.01:
             overrides.append("ve.min_steps=3")  # at 10 steps the rate of small increments is far below the case's
+        if a.as_they_are and not (folder / "history.csv").exists():
+            continue
         rows, rejected = run(a.femxdem, case, folder, overrides, a.as_they_are)
         curves.append((key, rows))
         reference = next(rows for other, rows in curves if other[3] == seed)
