@@ -33,17 +33,21 @@ std::filesystem::path find_executable(const std::filesystem::path& given) {
   return std::filesystem::exists(beside) ? beside : std::filesystem::path(FEMXDEM_WORKER);
 }
 
-/// Environment of the worker: one thread, nothing of our MPI, nothing that moves Python's own folders.
+/// Environment of the worker: one thread, nothing of our MPI, nothing that moves Python's own folders. CHOLMOD asks
+/// OpenMP for four threads whatever OMP_NUM_THREADS says, and a trial, being a fork, waits for ever for those of its
+/// parent: the limit leaves none.
 std::vector<std::string> worker_environment() {
   std::vector<std::string> kept;
   for (char** entry = environ; *entry; ++entry) {
     const std::string_view text = *entry;
     bool ours = false;
-    for (const std::string_view prefix : {"OMPI_", "PMIX_", "PMI_", "OMP_NUM_THREADS=", "PYTHONHOME="})
+    for (const std::string_view prefix :
+         {"OMPI_", "PMIX_", "PMI_", "OMP_NUM_THREADS=", "OMP_THREAD_LIMIT=", "PYTHONHOME="})
       ours = ours || text.starts_with(prefix);
     if (!ours) kept.emplace_back(text);
   }
   kept.emplace_back("OMP_NUM_THREADS=1");
+  kept.emplace_back("OMP_THREAD_LIMIT=1");
   return kept;
 }
 

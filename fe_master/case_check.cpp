@@ -341,7 +341,7 @@ struct PresetSettings {
 };
 /// On the front of speed against accuracy as measured by validation/speed_accuracy.
 const std::map<VePreset, PresetSettings> kPresets = {
-    {VePreset::fast, {100, 1e-2}}, {VePreset::balanced, {1000, 1e-2}}, {VePreset::accurate, {1000, 5e-3}}};
+    {VePreset::fast, {100, 2e-2}}, {VePreset::balanced, {400, 2e-2}}, {VePreset::accurate, {1000, 2e-2}}};
 
 }  // namespace
 

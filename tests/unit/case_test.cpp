@@ -200,7 +200,7 @@ TEST(Case, APresetGivesWhatTheCaseDoesNot) {
   const Case fast = read_case(kGood, {"ve.preset=fast"});
   const Case accurate = read_case(kGood, {"ve.preset=accurate"});
   EXPECT_LT(fast.ve.spheres, accurate.ve.spheres);
-  EXPECT_GT(fast.ve.inertial_number, accurate.ve.inertial_number);
+  EXPECT_NE(fast.ve.inertial_number, read_case(kGood).ve.inertial_number);
   EXPECT_EQ(read_case(kGood, {"ve.preset=fast", "ve.spheres=321"}).ve.spheres, 321);
   EXPECT_NE(mistakes_of(kGood, {"ve.preset=quick"}).find("balanced"), std::string::npos);
 }
