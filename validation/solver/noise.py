@@ -45,7 +45,7 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("out/noise"))
     parser.add_argument("--cache", type=Path, default=Path("packings"))
     parser.add_argument("--spheres", type=int, nargs="+", default=[100, 200, 1000])
-    parser.add_argument("--inertial-numbers", type=float, nargs="+", default=[1e-2, 5e-3, 2e-3, 1e-3])
+    parser.add_argument("--inertial-numbers", type=float, nargs="+", default=[2e-2, 1e-2, 5e-3, 2e-3, 1e-3])
     parser.add_argument("--samples", type=int, default=5)
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
