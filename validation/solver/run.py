@@ -41,13 +41,15 @@ STRATEGIES = {
 CLOSED_FORM_ONLY = {"newton", "newton_line_search"}
 
 
-def run(femxdem, case, folder, overrides, as_it_is):
+def run(femxdem, case, folder, overrides):
+    command = [femxdem, "run", case, "--out", folder, "--overwrite"]
+    for override in overrides:
+        command += ["--set", override]
+    subprocess.run(command, stdout=subprocess.DEVNULL)
+
+
+def read(folder):
     """Rows of history.csv, rejected attempts by their reason."""
-    if not (as_it_is or (folder / "summary.json").exists()):
-        command = [femxdem, "run", case, "--out", folder, "--overwrite"]
-        for override in overrides:
-            command += ["--set", override]
-        subprocess.run(command, stdout=subprocess.DEVNULL)
     with open(folder / "history.csv") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     rejected = re.findall(r"rejected: (\w+)", (folder / "log.txt").read_text())
@@ -146,9 +148,11 @@ def main():
             overrides.append(f"ve.seed={seed}")
         if not closed_form and increment < 0.01:
             overrides.append("ve.min_steps=3")  # at 10 steps the rate of small increments is far below the case's
+        if not a.as_they_are and not (folder / "summary.json").exists():
+            run(a.femxdem, case, folder, overrides)
         if a.as_they_are and not (folder / "history.csv").exists():
             continue
-        rows, rejected = run(a.femxdem, case, folder, overrides, a.as_they_are)
+        rows, rejected = read(folder)
         curves.append((key, rows))
         reference = next(rows for other, rows in curves if other[3] == seed)
         lines.append((key, measure(rows, rejected, monitor, end),
