@@ -113,6 +113,10 @@ void Engine::stiffness(int ve, Slot& slot, bool relaxed) {
   in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness), relaxed); });
 }
 
+void Engine::follow_network(int ve) {
+  in_python([&] { engine_.attr("follow_network")(ve); });
+}
+
 pid_t Engine::fork() {
   PyOS_BeforeFork();
   const pid_t pid = ::fork();

@@ -33,6 +33,7 @@ class Engine {
   /// Stress, report and stretch into the slot.
   void measure(int ve, Slot& slot);
   void stiffness(int ve, Slot& slot, bool relaxed);
+  void follow_network(int ve);
 
   /// fork() with the interpreter's consent.
   static pid_t fork();

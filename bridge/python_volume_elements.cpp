@@ -26,6 +26,15 @@ Tensor2 expm1(const Tensor2& A) {
   return sum;
 }
 
+/// In which class of strain and of pressure a cell is; where it leaves it, its contact network may be another.
+std::array<int, 2> network_level(const Slot& slot) {
+  const Tensor2 F = tensor(slot.stretch);
+  const double strain = 0.5 * Tensor2((F.transpose() * F).log()).norm();
+  const double pressure = -tensor(slot.stress).trace() / 3;
+  const double level = pressure > 0 ? std::floor(std::log2(pressure)) : -1e3;
+  return {static_cast<int>(strain / 0.02), static_cast<int>(level)};
+}
+
 std::string unstrained(const Tensor2& F) {
   return fmt::format(
       "deformation gradient [{:.4g} {:.4g} {:.4g}; {:.4g} {:.4g} {:.4g}; {:.4g} {:.4g} {:.4g}] is not "
@@ -75,9 +84,10 @@ void PythonVolumeElements::add(const std::string& state, std::size_t count) {
                     "number sets no rate; start from a state under compression",
                     added.mean_stress, added.time_step));
   committed_stretch_.resize(first + count);
+  committed_level_.resize(first + count);
   reference_time_scale_.resize(first + count, added.time_scale);
   frozen_steps_.resize(first + count, 0);
-  for (std::size_t i = first; i < size(); ++i) adopt_stretch(i);
+  for (std::size_t i = first; i < size(); ++i) adopt_state(i);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
 }
 
@@ -193,17 +203,23 @@ void PythonVolumeElements::commit() {
   if (!trial_pending_) throw std::logic_error("commit: there is no trial");
   if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
   peak_memory_ = std::max(peak_memory_, worker_.memory());
+  const auto request = [&] {
+    for (std::size_t i = 0; i < size(); ++i)
+      worker_.slot(i).task = network_level(worker_.slot(i)) == committed_level_[i] ? Task::skip : Task::follow_network;
+    return worker_.request(Command::commit);
+  };
   Reply reply;
   try {
-    reply = worker_.request(Command::commit);
+    reply = request();
   } catch (const UserError&) {  // the trial died while it waited: the inputs are still there
+    for (std::size_t i = 0; i < size(); ++i) worker_.slot(i).task = Task::deform;
     std::vector<Response> responses(size());
     run_trial(with_stiffness_, responses);
-    reply = worker_.request(Command::commit);
+    reply = request();
   }
   worker_.adopt(static_cast<pid_t>(reply.value));
   trial_pending_ = false;
-  for (std::size_t i = 0; i < size(); ++i) adopt_stretch(i);
+  for (std::size_t i = 0; i < size(); ++i) adopt_state(i);
   begin_step();
 }
 
@@ -212,7 +228,7 @@ SavedStates PythonVolumeElements::save() {
   SavedStates states;
   for (std::size_t i = 0; i < size(); ++i) {
     states.push_back(worker_.mail(worker_.request(Command::save, static_cast<std::int64_t>(i))));
-    adopt_stretch(i);
+    adopt_state(i);
   }
   begin_step();
   return states;
@@ -224,7 +240,7 @@ void PythonVolumeElements::load(const SavedStates& states) {
   drop_trial();
   for (std::size_t i = 0; i < size(); ++i) {
     worker_.request(Command::load, static_cast<std::int64_t>(i), 0, states[i]);
-    adopt_stretch(i);
+    adopt_state(i);
   }
   begin_step();
 }
@@ -234,8 +250,9 @@ void PythonVolumeElements::drop_trial() {
   trial_pending_ = false;
 }
 
-void PythonVolumeElements::adopt_stretch(std::size_t index) {
+void PythonVolumeElements::adopt_state(std::size_t index) {
   committed_stretch_[index] = tensor(worker_.slot(index).stretch);
+  committed_level_[index] = network_level(worker_.slot(index));
 }
 
 }  // namespace femxdem

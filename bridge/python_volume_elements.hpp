@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -29,7 +30,9 @@ struct VolumeElementOptions {
 /// L = (U_inc^(1/n) - I) / dt, U_inc = U U_n^-1, and the answer is rotated by R. The number of steps
 /// n = max(min_steps, |ln U_inc| / (rate dt)), rate = I / (a sqrt(rho / p)) with the pressure of the state that was
 /// added, is frozen from the first trial of a load step on (unless a later one would need more than twice as many), so
-/// that the response is a smooth function of F.
+/// that the response is a smooth function of F. Between load steps the time step dt follows the contact network, looked
+/// at whenever |ln U_n| passes a multiple of 0.02 or the pressure a power of 2: a rule of the states alone, so that
+/// a run that goes on from a checkpoint keeps its bits.
 class PythonVolumeElements : public LocalPoints {
  public:
   PythonVolumeElements(WorkerProcess& worker, VolumeElementOptions options);
@@ -61,16 +64,18 @@ class PythonVolumeElements : public LocalPoints {
 
  private:
   struct Plan;
+  using NetworkLevel = std::array<int, 2>;  ///< of strain and of pressure
   Plan plan(std::size_t index, const Tensor2& F);
   void run_trial(bool with_stiffness, std::vector<Response>& responses);
   void fail_after_deaths(std::vector<Response>& responses, std::vector<int>& deaths, std::int64_t status);
   void read(std::size_t index, const Plan& plan, Operator wanted, Response& response);
   void drop_trial();
-  void adopt_stretch(std::size_t index);
+  void adopt_state(std::size_t index);
 
   WorkerProcess& worker_;
   VolumeElementOptions options_;
   std::vector<Tensor2> committed_stretch_;
+  std::vector<NetworkLevel> committed_level_;
   std::vector<double> reference_time_scale_;  ///< a sqrt(rho / p) when it was added [s]
   std::vector<long> frozen_steps_;            ///< 0: to be chosen at the next trial
   std::uint64_t peak_memory_ = 0;

@@ -195,6 +195,7 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
 }
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
+  follow_networks();
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
   batch_.child = 0;
@@ -208,6 +209,7 @@ void Worker::commit_in_process(const Message& message) {
   if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
   trial_in_process_ = false;
   snapshot_.clear();
+  follow_networks();
   reply(message, ReplyKind::done, getpid());
 }
 
@@ -224,10 +226,19 @@ void Worker::take_snapshot() {
   }
 }
 
+void Worker::follow_networks() noexcept {
+  for (std::size_t i = 0; i < ves_.size(); ++i) {
+    Slot& slot = batch_.slots[i];
+    if (slot.task != Task::follow_network) continue;
+    engine_.follow_network(ves_[i]);
+    slot.info.time_step = engine_.info(ves_[i]).time_step;
+  }
+}
+
 void Worker::deform_all(std::int64_t stiffness) {
   for (std::size_t i = 0; i < ves_.size(); ++i) {
     batch_.slots[i].outcome = Outcome::none;
-    if (batch_.slots[i].task == Task::skip) continue;
+    if (batch_.slots[i].task != Task::deform) continue;
     batch_.in_flight = static_cast<std::int64_t>(i);
     deform_one(i, stiffness);
   }

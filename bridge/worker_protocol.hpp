@@ -58,8 +58,9 @@ struct Reply {
   std::int64_t mail = 0;
 };
 
-/// What a volume element is asked to do in a trial.
-enum class Task : std::int64_t { deform, skip };
+/// What a volume element is asked to do: in a trial, deform or nothing; when it is committed, let its time step follow
+/// its contact network or nothing.
+enum class Task : std::int64_t { deform, skip, follow_network };
 
 /// What became of it.
 enum class Outcome : std::int64_t { none, answered, failed };
@@ -86,7 +87,7 @@ struct Slot {
   std::array<double, kReportFields.size()> report{};
   std::array<double, 9> stretch{};     ///< deformation gradient of the cell from the reference
   std::array<double, 81> stiffness{};  ///< [Pa], when asked for
-  VeInfo info;                         ///< when it was added, saved or loaded
+  VeInfo info;                         ///< when it was added, saved or loaded; the time step as it is
   std::array<char, 400> sentence{};    ///< why it failed, zero-terminated
 };
 

@@ -26,6 +26,7 @@ FINITE_WITHOUT_TIME = {
 }
 ADHESION_TAG = "femxdem_adhesion_of_new_contacts"
 STIFFNESS_TAG = "femxdem_constant_stiffness"
+SAFETY_TAG = "femxdem_time_step_safety"
 
 
 def engines(law, kn, kt, damping):
@@ -106,6 +107,17 @@ def make_new_contacts_adhesive(O, f_c, friction):
 def adhesion_of_new_contacts(O):
     """(f_c [N], friction) of the scene's note, or None."""
     return _noted(O, ADHESION_TAG)
+
+
+def note_time_step_safety(O, safety):
+    """Notes in the scene that its time step is `safety` times the critical one of its contact network."""
+    _note(O, SAFETY_TAG, safety)
+
+
+def time_step_safety(O):
+    """What the scene's note says, or None."""
+    noted = _noted(O, SAFETY_TAG)
+    return noted and noted[0]
 
 
 def _note(O, tag, *numbers):

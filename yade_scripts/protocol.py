@@ -21,6 +21,8 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report; (9,) the cell's
                                        deformation gradient from the reference (adopted) state. sliding_contacts and
                                        adhesive_contacts may be as old as 200 DEM steps, the rest is of now
+    follow_network(ve)                 the time step of info() becomes what the state of now asks for; called between
+                                       load steps, never within one
     stiffness(ve, out_stiffness, relaxed)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised
                                        [Pa]; relaxed: the same contact network with its grains in equilibrium
 """
@@ -38,7 +40,7 @@ class DummyEngine:
 
     spec: youngs_modulus [Pa], poisson_ratio [-], confining_stress [Pa], and for tests of failures
     `fault` = "none" | "segv" | "raise" | "hang", which strikes in a deform that ends beyond the stretch
-    `fault_strain` (largest |F - I|).
+    `fault_strain` (largest |F - I|). Its time step is halved each time that it is to follow the network.
     """
 
     DEFAULTS = {
@@ -58,7 +60,7 @@ class DummyEngine:
         return {"yade": "dummy", "numpy": np.__version__}
 
     def make_template(self, spec):
-        cell = {**self.DEFAULTS, **spec, "F": np.eye(3), "steps": 0}
+        cell = {**self.DEFAULTS, **spec, "F": np.eye(3), "steps": 0, "time_step": self.TIME_STEP}
         return {"state": pickle.dumps(cell), "manifest": {"source": "dummy"}}
 
     def add(self, state):
@@ -77,7 +79,7 @@ class DummyEngine:
 
     def info(self, ve):
         return {
-            "time_step": self.TIME_STEP,
+            "time_step": self.cells[ve]["time_step"],
             "time_scale": 1e-3,
             "volume": 1e-9,
             "spheres": 1,
@@ -87,11 +89,14 @@ class DummyEngine:
 
     def deform(self, ve, velocity_gradient, steps):
         cell = self.cells[ve]
-        step = np.eye(3) + np.asarray(velocity_gradient).reshape(3, 3) * self.TIME_STEP
+        step = np.eye(3) + np.asarray(velocity_gradient).reshape(3, 3) * cell["time_step"]
         cell["F"] = np.linalg.matrix_power(step, steps) @ cell["F"]
         cell["steps"] = steps
         if cell["fault"] != "none" and np.abs(cell["F"] - np.eye(3)).max() > cell["fault_strain"]:
             self._fault(ve, cell["fault"])
+
+    def follow_network(self, ve):
+        self.cells[ve]["time_step"] /= 2
 
     @staticmethod
     def _fault(ve, kind):
@@ -117,5 +122,5 @@ class DummyEngine:
         stress = np.einsum("ijkl,kl->ij", C.reshape(3, 3, 3, 3), strain) - cell["confining_stress"] * np.eye(3)
         out_stress[:] = stress.ravel()
         out_stretch[:] = cell["F"].ravel()
-        values = {"dem_steps": cell["steps"], "time_step": self.TIME_STEP, "contacts": 1}
+        values = {"dem_steps": cell["steps"], "time_step": cell["time_step"], "contacts": 1}
         out_report[:] = [values.get(name, 0.0) for name in self.report_fields]

@@ -15,7 +15,7 @@ import packing
 import probing
 import user_scenes
 import yade_modules
-from time_step import safe_time_step
+from time_step import follow_network, set_time_step
 
 DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
@@ -71,7 +71,7 @@ class Engine:
         manifest = {"source": spec["source"], "notes": self._make_scene(spec)}
         own = self.O.dt
         manifest.update(adoption.adopt(self.O))
-        self.O.dt, manifest["time_step_from"] = safe_time_step(self.O, own, spec["time_step_safety"])
+        manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
         self._to_forces()
         grains = _grains(self.O)
         manifest.update(self._geometry(grains), **self._contact_network(grains))
@@ -187,6 +187,10 @@ class Engine:
                 "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
             )
         out_stiffness[:] = C.ravel()
+
+    def follow_network(self, ve):
+        self._select(ve)
+        follow_network(self.O)
 
     def _select(self, ve):
         if self.O.thisScene != ve:

@@ -109,6 +109,34 @@ TEST(PythonVolumeElements, StepsAreFrozenWithinALoadStep) {
   EXPECT_EQ(steps(1e-6), 10) << "min_steps";
 }
 
+TEST(PythonVolumeElements, TimeStepFollowsTheNetworkAtCommitsThatLeaveAClass) {
+  // pressure 1e5 + K (1 - F_11), K = 6.67e7: 1.07e5 lies in the class of 2^16 to 2^17, 1.67e5 does not
+  for (const VolumeElementOptions& options : {VolumeElementOptions{}, serialised()}) {
+    Points one({kPlain}, dummy(), options);
+    Tensor2 near = Tensor2::Identity(), far = Tensor2::Identity(), further = Tensor2::Identity();
+    near(0, 0) -= 1e-4;
+    far(0, 0) -= 1e-3;
+    further(0, 0) -= 2e-3;
+    const auto steps = [&](const Tensor2& F) {
+      const Response response = one.points.evaluate(std::vector{F}, Operator::none)[0];
+      EXPECT_FALSE(response.failure);
+      return response.report["dem_steps"];
+    };
+    EXPECT_EQ(steps(far), 21) << "a trial that is given up";
+    steps(near);
+    one.points.commit();
+    EXPECT_EQ(one.points.info(0).time_step, 1e-5);
+    EXPECT_EQ(steps(far), 19);
+    one.points.commit();
+    EXPECT_EQ(one.points.info(0).time_step, 5e-6);
+    EXPECT_EQ(steps(further), 41);
+    const SavedStates states = one.points.save();
+    EXPECT_EQ(one.points.info(0).time_step, 5e-6);
+    one.points.load(states);
+    EXPECT_EQ(one.points.info(0).time_step, 5e-6);
+  }
+}
+
 TEST(PythonVolumeElements, AnEngineThatRaisesIsAFailureOfItsPoint) {
   Points three({kPlain, R"({"fault": "raise", "fault_strain": 5e-4})", kPlain});
   const auto responses = three.points.evaluate(gradients(3, 1e-3), Operator::none);

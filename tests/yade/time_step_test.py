@@ -2,7 +2,10 @@
 
 import unittest
 
+import numpy as np
+
 import contact_loop
+import contact_models_test as contact_models
 from cells import engine, measure, rate, select, template
 from time_step import critical_time_step
 
@@ -26,6 +29,24 @@ def unbalanced(spec, factor):
     return result
 
 
+def compressed(state, follow, factor):
+    """Pressure [Pa], unbalanced force and time step over the critical one after 6 % of isotropic compression, begun with
+    `factor` times the state's time step."""
+    ve = engine().add(state)
+    O = select(ve)
+    O.dt *= factor
+    strain_rate = 5e-3 / engine().info(ve)["time_scale"]
+    for _ in range(40):
+        steps = int(np.ceil(0.06 / 40 / (strain_rate * O.dt)))
+        engine().deform(ve, -np.eye(3) * 0.06 / 40 / (steps * O.dt), steps)
+        if follow:
+            engine().follow_network(ve)
+    stress, report, _ = measure(ve)
+    over = O.dt / critical_time_step(O, contact_loop.contacts(O))
+    engine().remove(ve)
+    return -np.trace(stress) / 3, report["unbalanced_force"], over
+
+
 class TimeStep(unittest.TestCase):
     def test_automatic_step_is_stable_and_at_least_0_7_of_the_largest_stable_one(self):
         """0.8 times critical against 1.14 times critical = 0.8/0.7, which is over the cliff."""
@@ -40,6 +61,28 @@ class TimeStep(unittest.TestCase):
         below = [unbalanced(spec, f) for f in (0.4, 0.8, 1.0)]
         self.assertLess(max(below), 1.5 * min(below) + 0.02)
         self.assertGreater(unbalanced(spec, 1.5), 0.3)
+
+    def test_hertzian_contacts_stiffen_and_the_step_follows(self):
+        """6 % of isotropic compression, the pressure grows thirtyfold: the first step ends up far beyond the cliff."""
+        state = engine().save(contact_models.element("Hertz-Mindlin")[0])
+        followed, fixed, finer = (compressed(state, *how) for how in ((True, 1.0), (False, 1.0), (False, 0.3)))
+        print("pressure [Pa], unbalanced force, time step over the critical one")
+        for name, values in (("step followed", followed), ("step kept", fixed), ("0.3 of the first step", finer)):
+            print(f"{name:22} {values[0]:.4g} {values[1]:.1e} {values[2]:.2f}")
+        self.assertAlmostEqual(followed[0] / finer[0], 1, delta=2e-3)
+        self.assertLess(followed[1], 2e-3)
+        self.assertLess(followed[2], 0.88 + 1e-9)
+        self.assertLess(fixed[0], 0.7 * finer[0])
+        self.assertGreater(fixed[1], 0.2)
+
+    def test_linear_contacts_keep_their_step(self):
+        ve = engine().add(template(CELLS[0])["state"])
+        before = engine().info(ve)["time_step"]
+        for _ in range(5):
+            engine().deform(ve, rate(ve, 5e-3, BIAXIAL), 200)
+            engine().follow_network(ve)
+        self.assertEqual(engine().info(ve)["time_step"], before)
+        engine().remove(ve)
 
     def test_time_step_of_a_template_is_the_safety_factor_times_the_critical_one(self):
         half = template({**CELLS[0], "time_step_safety": 0.4})["manifest"]["time_step"]
