@@ -6,8 +6,7 @@ import contact_laws
 from contact_loop import contacts, has_stiffness, values
 
 ITERATIONS = 60
-KEPT = 0.6, 1.1  # time step over the safe one: within these bounds it is left alone. A sphere that comes loose, and may come
-# back, makes the safe one 1.5 times as long (validation/time_step): not worth following.
+KEPT = 0.6, 1.1  # time step over the safe one: within these bounds it is left alone
 
 
 def set_time_step(O, own, safety):
@@ -28,9 +27,10 @@ def set_time_step(O, own, safety):
 
 def follow_network(O):
     """Sets the time step anew where the contact network from which it comes has become stiffer or softer than KEPT allows:
-    contacts after Hertz stiffen with the pressure. Linear contacts change the safe step by some per cent: it is kept."""
+    contacts after Hertz stiffen with the pressure. Where all contacts have the same stiffness for ever, the safe step changes
+    by 6 to 9 % when the pressure grows fourteen to thirtyfold (validation/time_step): it is kept."""
     safety = contact_laws.time_step_safety(O)
-    if safety is None or not O.interactions.countReal():
+    if safety is None or contact_laws.constant_stiffness(O) or not O.interactions.countReal():
         return
     safe = safety * critical_time_step(O, contacts(O))
     if not KEPT[0] <= O.dt / safe <= KEPT[1]:
