@@ -70,10 +70,10 @@ DEFAULTS = {
 }
 
 
-def element(model):
+def element(model, **changes):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "theirs.py"
-        path.write_text(SCRIPT % {**DEFAULTS, **MODELS[model]})
+        path.write_text(SCRIPT % {**DEFAULTS, **MODELS[model], **changes})
         made = engine().make_template({"source": "script", "script": str(path), "script_steps": 60_000})
     print(model, {k: made["manifest"][k] for k in ("spheres", "contacts", "unbalanced_force", "notes", "porosity")})
     return engine().add(made["state"]), made["manifest"]

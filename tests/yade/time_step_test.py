@@ -89,6 +89,13 @@ class TimeStep(unittest.TestCase):
         half = template({**CELLS[0], "time_step_safety": 0.4})["manifest"]["time_step"]
         self.assertAlmostEqual(half, 0.5 * template(CELLS[0])["manifest"]["time_step"], delta=1e-12 * half)
 
+    def test_erased_bodies_leave_a_gap_in_the_numbers(self):
+        whole = contact_models.element("frictional")[1]
+        erased = contact_models.element("frictional", grains=contact_models.SPHERES + "\nfor k in (0, 7, 20): O.bodies.erase(k)")[1]
+        self.assertEqual((whole["spheres"], erased["spheres"]), (60, 57))
+        self.assertEqual(erased["time_step_from"], "contact network")
+        self.assertAlmostEqual(erased["time_step"] / whole["time_step"], 1, delta=0.1)
+
     def test_power_iteration_has_converged(self):
         import time_step
 
