@@ -12,6 +12,7 @@
 
 #include "python_volume_elements.hpp"
 #include "ve_templates.hpp"
+#include "volume_elements.hpp"
 
 /// What the bridge costs beside the DEM engine, on volume elements as they are used:
 ///

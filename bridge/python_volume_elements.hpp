@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "volume_elements.hpp"
+#include "material_points.hpp"
 #include "worker_process.hpp"
 
 namespace femxdem {

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "python_volume_elements.hpp"
+#include "volume_elements.hpp"
 
 /// Points with a history, in closed form, that complain on demand.
 namespace femxdem {

@@ -230,7 +230,7 @@ Case volume_elements(const std::vector<std::string>& more) {
 
 TEST(VePool, RegionsAndSeedsMakeTemplates) {
   const Case c = volume_elements({"ve.assignment=same", "ve.seeds=[5, 6]"});
-  const Mesh mesh = make_mesh(c);
+  const Mesh mesh = make_mesh(c.mesh, c.regions);
   const VePool pool = ve_pool(c, mesh);
   ASSERT_EQ(pool.templates.size(), 2u) << "the second seed is not in use";
   EXPECT_EQ(pool.templates[0].friction, 0.5);
@@ -241,7 +241,7 @@ TEST(VePool, RegionsAndSeedsMakeTemplates) {
 
 TEST(VePool, RandomAssignmentFollowsItsSeedAlone) {
   const Case c = volume_elements({"ve.assignment_seed=3"});
-  const Mesh mesh = make_mesh(c);
+  const Mesh mesh = make_mesh(c.mesh, c.regions);
   const VePool pool = ve_pool(c, mesh), again = ve_pool(c, mesh);
   EXPECT_EQ(pool.template_of_element, again.template_of_element);
   EXPECT_NE(pool.template_of_element, ve_pool(volume_elements({"ve.assignment_seed=4"}), mesh).template_of_element);
@@ -268,7 +268,7 @@ TEST(VePool, SpecIsJsonOfOneVolumeElement) {
 
 TEST(Materials, RegionsOverrideTheBase) {
   const Case c = read_case(kGood);
-  const auto materials = material_of_element(c, make_mesh(c));
+  const auto materials = material_of_element(c, make_mesh(c.mesh, c.regions));
   for (int e = 0; e < 32; ++e) EXPECT_EQ(materials[e].cohesion, e == 9 ? 1.8e4 : 2e4) << e;
 }
 

@@ -67,8 +67,8 @@ TEST_F(CheckpointTest, IsReadBackToTheLastBit) {
     if (values.empty()) continue;
     EXPECT_EQ(std::memcmp(read.arrays[k].second.data(), values.data(), 8 * values.size()), 0);
   }
-  EXPECT_EQ(read.array("u"), std::vector<double>{2});
-  EXPECT_THROW(static_cast<void>(read.array("w")), std::out_of_range);
+  EXPECT_EQ(find_array(read.arrays, "u"), std::vector<double>{2});
+  EXPECT_THROW(static_cast<void>(find_array(read.arrays, "w")), std::out_of_range);
 }
 
 TEST_F(CheckpointTest, EqualStatesAreStoredOnce) {

@@ -7,8 +7,8 @@
 #include "analytic_points.hpp"
 #include "elastic_problem.hpp"
 #include "errors.hpp"
+#include "learned_tangent.hpp"
 #include "loads.hpp"
-#include "point_tangent.hpp"
 
 namespace femxdem {
 namespace {
@@ -115,10 +115,9 @@ double lame_error(int n) {
   std::map<int, double> prescribed;
   for (const int node : edge_nodes(mesh, "start")) prescribed[2 * node + 1] = 0;
   for (const int node : edge_nodes(mesh, "end")) prescribed[2 * node] = 0;
-  Case c;
-  c.control.end_time = 1;
-  c.loads = {{.edge = "inner", .point = {}, .kind = LoadKind::pressure, .value = 1, .table = {}}};
-  const Eigen::VectorXd force = Loads(c, element).external_force(Eigen::VectorXd::Zero(element.unknowns()), 1);
+  Loads loads(element);
+  loads.add({.edge = "inner", .point = {}, .kind = LoadKind::pressure, .value = 1, .table = {}});
+  const Eigen::VectorXd force = loads.external_force(Eigen::VectorXd::Zero(element.unknowns()), 1);
   const Eigen::VectorXd x = solve_linear(element, kC, prescribed, force);
   double error = 0;
   for (const int node : edge_nodes(mesh, "inner")) {

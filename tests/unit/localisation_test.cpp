@@ -7,7 +7,7 @@
 
 #include "analytic_laws.hpp"
 #include "analytic_points.hpp"
-#include "global_operator.hpp"
+#include "point_operators.hpp"
 
 namespace femxdem {
 namespace {

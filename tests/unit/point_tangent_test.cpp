@@ -1,10 +1,9 @@
-#include "point_tangent.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "analytic_laws.hpp"
+#include "learned_tangent.hpp"
 
 namespace femxdem {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "analytic_points.hpp"
 #include "elastic_problem.hpp"
-#include "point_tangent.hpp"
+#include "learned_tangent.hpp"
 #include "second_gradient_q8.hpp"
 
 namespace femxdem {

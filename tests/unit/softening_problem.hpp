@@ -5,8 +5,8 @@
 
 #include "analytic_points.hpp"
 #include "loads.hpp"
+#include "nonlinear_solver.hpp"
 #include "second_gradient_q8.hpp"
-#include "solve_step.hpp"
 
 namespace femxdem {
 

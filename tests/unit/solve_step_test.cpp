@@ -1,11 +1,10 @@
-#include "solve_step.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "analytic_points.hpp"
 #include "elastic_problem.hpp"
+#include "nonlinear_solver.hpp"
 #include "second_gradient_q8.hpp"
 
 namespace femxdem {

@@ -1,5 +1,3 @@
-#include "ve_path.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 
 #include "analytic_points.hpp"
 #include "errors.hpp"
+#include "path.hpp"
 #include "path_driver.hpp"
 
 namespace femxdem {

@@ -6,9 +6,9 @@
 
 #include "assembler.hpp"
 #include "mesh.hpp"
+#include "nonlinear_solver.hpp"
 #include "path_driver.hpp"
-#include "simulation.hpp"
-#include "solve_step.hpp"
+#include "time_loop.hpp"
 #include "ve_templates.hpp"
 
 /// One homogeneous Q8 element of 1 m x 1 m in plane strain, side pressure sigma_0, compressed along y; its volume
@@ -79,11 +79,7 @@ struct Cells {
 
 struct OneElement : testing::Test {
   explicit OneElement(const Case& of = one_element())
-      : c(of),
-        element(make_element(c, mesh = make_mesh(c))),
-        loads(c, *element),
-        cells(c, element->points()),
-        solver(*element, cells.points, loads, with_default_tolerances(c.solver, true)) {}
+      : c(of), problem(c), cells(c, problem.element().points()), solver(problem.start(cells.points)) {}
 
   void step() {
     const StepResult result = solver.solve_step(c.control.step);
@@ -91,11 +87,9 @@ struct OneElement : testing::Test {
   }
 
   Case c;
-  Mesh mesh;
-  std::unique_ptr<Element> element;
-  Loads loads;
+  Problem problem;
   Cells cells;
-  NonlinearSolver solver;
+  NonlinearSolver& solver;
 };
 
 Case with_relaxed_operator() {
@@ -165,7 +159,9 @@ TEST_F(OneElement, AnswersAsItsVolumeElement) {
 TEST_F(OneElement, TurnsRigidly) {
   for (int i = 0; i < 3; ++i) step();
   const Equilibrium& loaded = solver.committed();
-  const Assembler assembler(*element, loads.prescribed_dofs());
+  const Element& element = problem.element();
+  const Mesh& mesh = problem.mesh();
+  const Assembler assembler(element, problem.loads().prescribed_dofs());
   Tensor2 Q;
   Q << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   const auto turned = [&](const Eigen::VectorXd& x) {
@@ -179,9 +175,9 @@ TEST_F(OneElement, TurnsRigidly) {
   const auto answer = [&](const Eigen::VectorXd& x) {
     std::vector<Tensor2> stresses;
     cells.points.begin_step();
-    for (const Response& r : cells.points.evaluate(element->deformation(x), Operator::none))
+    for (const Response& r : cells.points.evaluate(element.deformation(x), Operator::none))
       stresses.push_back(r.stress);
-    return std::pair(stresses, assembler.force(x, element->deformation(x), stresses));
+    return std::pair(stresses, assembler.force(x, element.deformation(x), stresses));
   };
   Eigen::VectorXd further = loaded.x;
   for (std::size_t n = 0; n < mesh.nodes.size(); ++n)

@@ -2,8 +2,8 @@
 #include <benchmark/benchmark.h>
 
 #include "analytic_points.hpp"
+#include "learned_tangent.hpp"
 #include "linear_solver.hpp"
-#include "point_tangent.hpp"
 #include "saddle.hpp"
 #include "second_gradient_q8.hpp"
 

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tensor.hpp"
+
+/// THE SEAM between the scales: the finite elements know material points only through this header,
+/// and the bridge to YADE knows the finite elements only through it.
+namespace femxdem {
+
+/// What a material point reports beside its stress. One list: results files, shared memory and the Python side follow
+/// it.
+// clang-format off
+inline constexpr std::array<std::string_view, 20> kReportFields = {
+    "dem_steps",          // DEM steps of this trial
+    "seconds",            // wall time of this trial [s]
+    "engine_seconds",     // of which inside the DEM engine's steps [s]
+    "unbalanced_force",   // mean resultant on a grain over mean contact force [-]
+    "inertial_number",    // rate a sqrt(rho / p) of this trial [-]
+    "time_step",          // of the DEM [s]
+    "porosity",           // [-]
+    "coordination",       // 2 contacts / grains [-]
+    "coordination_backbone",  // the same without rattlers (grains with fewer than 2 contacts) [-]
+    "fabric_xx", "fabric_yy", "fabric_zz", "fabric_xy", "fabric_yz", "fabric_zx",  // mean n_i n_j over contacts [-]
+    "mean_rotation",      // mean rotation angle of the grains since the reference [rad]
+    "adhesive_contacts",  // intact adhesive contacts over all contacts [-]
+    "stress_asymmetry",   // |skew sigma| / |sigma| before symmetrisation [-]
+    "sliding_contacts",   // contacts at the Coulomb limit over all contacts [-]
+    "contacts",           // number of contacts [-]
+};
+// clang-format on
+
+struct PointReport {
+  /// In the order of kReportFields; 0 where a law has no such quantity.
+  std::array<double, kReportFields.size()> values{};
+  double& operator[](std::string_view field);  ///< throws std::out_of_range on an unknown field
+  double operator[](std::string_view field) const;
+};
+
+/// Failure of a material point: a value, never an exit.
+struct Failure {
+  std::size_t point = 0;  ///< index in the batch
+  std::string sentence;   ///< what happened, with numbers
+  std::string advice;     ///< what to try
+};
+
+/// Answer of one material point to one trial; NaN until written, so that a forgotten entry cannot pass.
+struct Response {
+  Tensor2 stress = Tensor2::Constant(std::numeric_limits<double>::quiet_NaN());     ///< Cauchy [Pa], tension positive
+  Tensor4 stiffness = Tensor4::Constant(std::numeric_limits<double>::quiet_NaN());  ///< when asked for, see Operator
+  PointReport report;
+  std::optional<Failure> failure;
+};
+
+/// Which stiffness a trial is asked for.
+enum class Operator {
+  none,     ///< stress only; Response::stiffness stays NaN
+  elastic,  ///< sigma = C : sym(grad du) with both minor symmetries [Pa]; for a volume element Eq. (2) of Nguyen et al.
+            ///< (2017)
+  tangent,  ///< d sigma / d(spatial gradient) [Pa], spin of the stress included; only for laws in closed form
+};
+
+/// Opaque committed states, one per point, to be written to a checkpoint.
+using SavedStates = std::vector<std::string>;
+
+/// A batch of material points with a committed and a trial state.
+///
+/// Contract, tested on every implementation (tests/material_points_contract.hpp): equal F give equal bits; evaluate
+/// leaves the committed state alone; a rejected trial leaves no trace; commit then continue is one longer path; save
+/// and load give the same bits; det F <= 0 or NaN is a failure value that names the point.
+class MaterialPoints {
+ public:
+  virtual ~MaterialPoints() = default;
+  /// Number of points of the batch.
+  virtual std::size_t size() const = 0;
+  /// A new load step starts (also after a cut): whatever is frozen during a step's iterations, such as the number of
+  /// DEM steps of a point, is chosen anew at the next evaluate.
+  virtual void begin_step() {}
+  /// Responses to the trial deformation gradients F (size() of them, from the reference configuration), each reached
+  /// from the point's committed state.
+  virtual std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) = 0;
+  /// Adopt the last trial as the committed state.
+  virtual void commit() = 0;
+  /// Committed states; the points themselves go on from exactly what was saved (bit-equal restart).
+  virtual SavedStates save() = 0;
+  /// Replace the committed states by saved ones (size() of them).
+  virtual void load(const SavedStates& states) = 0;
+};
+
+/// The material points that one rank serves; the bridge's volume elements, or a law in closed form in tests.
+class LocalPoints : public MaterialPoints {
+ public:
+  /// `count` more points, each in this state, at the end of the batch.
+  virtual void add(const std::string& state, std::size_t count) = 0;
+  /// Largest memory so far of what stands behind the points [byte].
+  virtual std::uint64_t peak_memory() const = 0;
+};
+
+}  // namespace femxdem

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace femxdem {
+
+/// Settings of speed against accuracy: validation/speed_accuracy has their errors.
+enum class VePreset { none, fast, balanced, accurate };
+enum class VeSource { prepare, scene, script };
+enum class ContactLaw { adhesive, bonded, friction };
+enum class NewContacts { frictional, adhesive };
+enum class Snapshot { fork, serialise };
+enum class VeStiffness { affine, relaxed };
+enum class Assignment { same, random };
+struct VeParameters {
+  VePreset preset = VePreset::none;  ///< gives spheres and inertial_number where the case does not
+  VeSource source = VeSource::prepare;
+  std::string script;                  ///< user's YADE script, absolute path
+  std::string scene;                   ///< saved YADE scene, absolute path
+  std::vector<std::string> arguments;  ///< command-line arguments of the script
+  int spheres = 1000;
+  double size_ratio = 1.5;                        ///< largest over smallest diameter [-]
+  double kappa = 500.0;                           ///< k_n / (sigma_0 a) [-]
+  double stiffness_ratio = 1.0;                   ///< k_n / k_t [-]
+  double friction = 0.5;                          ///< mu, inter-granular [-]
+  double cohesion = 1.0;                          ///< p* = f_c / (sigma_0 a^2) [-]
+  ContactLaw contact_law = ContactLaw::adhesive;  ///< what cohesion means
+  double compaction_friction = 0.0;               ///< mu during the preparation: sets the density [-]
+  double confining_stress = 1e5;                  ///< sigma_0, isotropic [Pa], compression positive
+  double mean_diameter = 1e-3;                    ///< a [m]
+  double density = 2600.0;                        ///< of the grains [kg/m^3]
+  int seed = 1;                                   ///< of the preparation
+  double damping = 0.2;                           ///< local damping of YADE's integrator [-]
+  double inertial_number = 5e-3;                  ///< I = rate a sqrt(rho / p) of a trial [-]
+  double time_step_safety = 0.8;                  ///< DEM time step / critical one [-]
+  int min_steps = 10;                             ///< least DEM steps of a trial that strains
+  bool freeze_steps = true;                       ///< the DEM steps of a load step's trials are those of its first
+  double max_unbalanced_force = 0.2;              ///< an answer above is refused [-]
+  NewContacts new_contacts = NewContacts::frictional;
+  VeStiffness stiffness = VeStiffness::affine;
+  Snapshot snapshot = Snapshot::fork;
+  std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
+  Assignment assignment = Assignment::same;  ///< of the pool to the elements
+  int assignment_seed = 1;
+  std::string cache;  ///< folder of prepared packings, absolute path; empty: the caller chooses
+};
+
+}  // namespace femxdem

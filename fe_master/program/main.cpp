@@ -1,0 +1,201 @@
+// femxdem: boundary value problems of granular materials, finite elements with volume elements of spheres.
+#include <mpi.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "analytic_points.hpp"
+#include "case.hpp"
+#include "errors.hpp"
+#include "mesh.hpp"
+#include "time_loop.hpp"
+#include "ve_commands.hpp"
+#include "ve_templates.hpp"
+#include "versions.hpp"
+#include "volume_elements.hpp"
+
+/// Of OpenBLAS, where that is the BLAS that SuiteSparse runs on.
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));
+
+namespace femxdem {
+namespace {
+
+struct Arguments {
+  std::string case_file;
+  std::string folder;
+  std::vector<std::string> overrides;
+  bool restart = false;
+  bool overwrite = false;
+  int noise_samples = 0;
+  std::string command_line;
+};
+
+/// MPI for the life of the program; the worker must have been started before.
+struct Mpi {
+  Mpi() {
+    MPI_Init(nullptr, nullptr);
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &size);
+  }
+  ~Mpi() { MPI_Finalize(); }
+  Mpi(const Mpi&) = delete;
+  Mpi& operator=(const Mpi&) = delete;
+  /// Whether rank 0 goes on: what it found out before the ranks work together.
+  bool agree(bool go) const {
+    int flag = go;
+    MPI_Bcast(&flag, 1, MPI_INT, 0, MPI_COMM_WORLD);
+    return flag != 0;
+  }
+  int rank = 0, size = 1;
+};
+
+/// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
+bool speaks() {
+  const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
+  return rank == nullptr || std::string(rank) == "0";
+}
+
+RunOptions run_options(const Arguments& arguments) {
+  RunOptions options;
+  options.folder = arguments.folder;
+  options.existing = arguments.restart     ? Existing::resume
+                     : arguments.overwrite ? Existing::overwrite
+                                           : Existing::refuse;
+  options.command_line = arguments.command_line;
+  options.versions = library_versions();
+  return options;
+}
+
+RunOptions run_options(const Case& c, const Arguments& arguments) {
+  RunOptions options = run_options(arguments);
+  if (options.folder.empty()) options.folder = c.output.directory;
+  if (options.folder.empty()) options.folder = std::filesystem::path("out") / std::filesystem::path(c.file).stem();
+  return options;
+}
+
+VeArguments ve_arguments(const Arguments& arguments) {
+  return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.noise_samples};
+}
+
+int run_on_volume_elements(Problem& problem, RunOptions options) {
+  WorkerProcess worker({});
+  const Mpi mpi;
+  VolumeElementOptions ve = ve_options(problem.parameters().ve);
+  ve.say = [rank = mpi.rank](std::string_view remark) { std::cerr << "rank " << rank << ": " << remark << std::endl; };
+  PythonVolumeElements local(worker, ve);
+  if (mpi.rank > 0) {
+    if (!mpi.agree(true)) return kBadInput;
+    serve(MPI_COMM_WORLD, local);
+    return kDone;
+  }
+  const Problem::Start start = problem.volume_elements();
+  std::vector<std::string> templates;
+  try {
+    templates = make_templates(local, start.templates, [](std::string_view line) { std::cout << line << std::endl; });
+    options.versions.merge(engine_versions(local));
+  } catch (...) {
+    mpi.agree(false);
+    throw;
+  }
+  mpi.agree(true);
+  options.ranks = mpi.size;
+  VolumeElements points(MPI_COMM_WORLD, local, templates, start.template_of_point);
+  options.complete = [&](Summary& summary) {
+    summary.evaluate_seconds = points.statistics().seconds;
+    summary.trial_seconds = points.statistics().trial_seconds;
+    summary.engine_seconds = points.statistics().engine_seconds;
+    summary.peak_memory_workers = points.peak_memory();
+  };
+  return run_case(problem, points, options);
+}
+
+int run(const Arguments& arguments) {
+  const Case c = read_case(arguments.case_file, arguments.overrides);
+  Problem problem(c);
+  const RunOptions options = run_options(c, arguments);
+  if (problem.on_volume_elements()) return run_on_volume_elements(problem, options);
+  const Mpi mpi;
+  if (mpi.rank > 0) return kDone;  // laws in closed form cost nothing: rank 0 alone
+  AnalyticPoints points(problem.laws());
+  return run_case(problem, points, options);
+}
+
+int check(const Arguments& arguments) {
+  const Case c = read_case(arguments.case_file, arguments.overrides);
+  const Mesh mesh = make_mesh(c.mesh, c.regions);
+  std::cout << c.file << ": no mistakes; " << mesh.elements.size() << " elements, "
+            << kPointsPerElement * mesh.elements.size() << " material points\n";
+  return kDone;
+}
+
+}  // namespace
+}  // namespace femxdem
+
+int main(int argc, char** argv) {
+  using namespace femxdem;
+  if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
+  Arguments arguments;
+  for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
+
+  CLI::App app("femxdem: finite elements whose material is a volume element of spheres in YADE");
+  app.require_subcommand(0, 1);
+  app.add_flag_callback(
+      "--version",
+      [] {
+        std::cout << describe_versions();
+        std::exit(kDone);
+      },
+      "Versions of the program and of what it uses, and what is missing");
+  const auto add_case = [&](CLI::App* command) {
+    command->add_option("case", arguments.case_file, "Case file (TOML)")->required();
+    command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
+  };
+  CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
+  add_case(run_command);
+  run_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
+  run_command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
+  add_case(check_command);
+  CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
+
+  CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect");
+  ve_command->require_subcommand(1);
+  CLI::App* path_command = ve_command->add_subcommand("path", "Follow the [[path]] of a case with one material point");
+  add_case(path_command);
+  path_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
+  path_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  path_command
+      ->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
+      ->check(CLI::Range(3, 1000));
+  CLI::App* prepare_command = ve_command->add_subcommand("prepare", "Make the volume elements of a case");
+  add_case(prepare_command);
+  CLI::App* inspect_command =
+      ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");
+  add_case(inspect_command);
+  inspect_command->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
+
+  try {
+    app.parse(argc, argv);
+    if (*run_command) return run(arguments);
+    if (*check_command) return check(arguments);
+    if (*path_command) return ve_path(ve_arguments(arguments));
+    if (*prepare_command) return ve_prepare(ve_arguments(arguments));
+    if (*inspect_command) return ve_inspect(ve_arguments(arguments));
+    if (*parameters_command) std::cout << describe_parameters();
+    if (app.get_subcommands().empty()) std::cout << app.help();
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kBadInput;
+  } catch (const UserError& error) {
+    if (speaks()) std::cerr << error.what() << "\n";
+    return kBadInput;
+  } catch (const std::exception& error) {
+    std::cerr << "femxdem: " << error.what() << "\n";
+    return kPointFailed;
+  }
+}

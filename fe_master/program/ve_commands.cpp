@@ -1,0 +1,132 @@
+#include "ve_commands.hpp"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iostream>
+
+#include "errors.hpp"
+#include "mesh.hpp"
+#include "path.hpp"
+#include "ve_templates.hpp"
+
+namespace femxdem {
+namespace {
+
+namespace fs = std::filesystem;
+
+void say(std::string_view line) { std::cout << line << std::endl; }
+
+void refuse_ranks() {
+  const char* size = std::getenv("OMPI_COMM_WORLD_SIZE");
+  if (size != nullptr && std::string(size) != "1")
+    throw UserError("femxdem ve works on one volume element: start it without mpirun");
+}
+
+void refuse_closed_form(const Case& c) {
+  if (c.material.type != MaterialType::volume_element)
+    throw UserError(fmt::format(
+        "{}: its material is a law in closed form; set material.type = \"volume_element\" to have one", c.file));
+}
+
+/// The volume element of a case without its mesh: the base, in its first seed.
+VeParameters single_ve(const Case& c) {
+  VeParameters ve = c.ve;
+  if (!ve.seeds.empty()) ve.seed = ve.seeds.front();
+  return ve;
+}
+
+fs::path default_folder(const Case& c, const char* ending) {
+  fs::path folder = c.output.directory;
+  if (folder.empty()) folder = fs::path("out") / fs::path(c.file).stem();
+  folder += ending;
+  return folder;
+}
+
+int path_of_volume_element(const Case& c, VeArguments& arguments) {
+  WorkerProcess worker({});
+  PythonVolumeElements point(worker, ve_options(c.ve));
+  const std::vector<std::string> states = make_templates(point, {single_ve(c)}, say);
+  arguments.options.versions.merge(engine_versions(point));
+  arguments.options.complete = [&](Summary& summary) { summary.peak_memory_workers = point.peak_memory(); };
+  point.add(states.front(), 1);
+  return follow_path(c, point, arguments.options, arguments.noise_samples);
+}
+
+/// All volume elements of a case: those of its mesh, or of its seeds where it has none.
+std::vector<VeParameters> pool_of(const VeArguments& arguments) {
+  const Case c = read_path_case(arguments.file, arguments.overrides);
+  refuse_closed_form(c);
+  if (!c.loads.empty()) {
+    const Case problem = read_case(arguments.file, arguments.overrides);
+    return ve_pool(problem, make_mesh(problem.mesh, problem.regions)).templates;
+  }
+  if (c.ve.seeds.empty()) return {c.ve};
+  std::vector<VeParameters> pool;
+  for (const int seed : c.ve.seeds) {
+    pool.push_back(c.ve);
+    pool.back().seed = seed;
+  }
+  return pool;
+}
+
+/// Runs a Python program with this one's modules and waits for it; its exit status.
+int run_program(std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  std::cout.flush();
+  const pid_t pid = fork();
+  if (pid == 0) {
+    setenv("PYTHONPATH", FEMXDEM_PYTHON_MODULES, 1);
+    setenv("OMP_NUM_THREADS", "1", 1);
+    execv(arguments[0], arguments.data());
+    _exit(127);
+  }
+  int status = 0;
+  waitpid(pid, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kPointFailed;
+}
+
+}  // namespace
+
+int ve_path(VeArguments arguments) {
+  refuse_ranks();
+  const Case c = read_path_case(arguments.file, arguments.overrides);
+  if (arguments.options.folder.empty()) arguments.options.folder = default_folder(c, "_ve");
+  if (c.material.type == MaterialType::volume_element) return path_of_volume_element(c, arguments);
+  return follow_path(c, *make_analytic_point(c), arguments.options, arguments.noise_samples);
+}
+
+int ve_prepare(const VeArguments& arguments) {
+  refuse_ranks();
+  const std::vector<VeParameters> pool = pool_of(arguments);
+  WorkerProcess worker({});
+  PythonVolumeElements elements(worker, ve_options(pool.front()));
+  make_templates(elements, pool, say);
+  for (const VeParameters& ve : pool)
+    std::cout << std::ifstream(template_files(elements, ve).manifest).rdbuf() << std::endl;
+  return kDone;
+}
+
+int ve_inspect(const VeArguments& arguments) {
+  refuse_ranks();
+  fs::path state = arguments.file, folder = arguments.options.folder;
+  if (state.extension() == ".toml") {
+    const Case c = read_path_case(arguments.file, arguments.overrides);
+    refuse_closed_form(c);
+    if (folder.empty()) folder = default_folder(c, "_ve");
+    WorkerProcess worker({});
+    PythonVolumeElements elements(worker, ve_options(c.ve));
+    make_templates(elements, {single_ve(c)}, say);
+    state = template_files(elements, single_ve(c)).state;
+  }
+  if (!fs::is_regular_file(state)) throw UserError(fmt::format("{}: no such file; correct the path", state.string()));
+  if (folder.empty()) folder = "out" / state.stem();
+  const fs::path script = fs::path(FEMXDEM_YADE_SCRIPTS) / "inspect_ve.py";
+  return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});
+}
+
+}  // namespace femxdem

@@ -1,0 +1,246 @@
+#include "path.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "analytic_points.hpp"
+#include "errors.hpp"
+#include "history.hpp"
+#include "log.hpp"
+#include "nonlinear_solver.hpp"
+#include "path_driver.hpp"
+
+namespace femxdem {
+namespace {
+
+constexpr double kStrainIncrement = 1e-3;   // of the default path
+constexpr double kSmallestFraction = 1e-3;  // of a segment's increment: below it the path ends
+constexpr double kRoundOff = 1e-9;          // of a segment
+const std::array<std::string_view, 3> kLeftOut = {"dem_steps", "seconds", "engine_seconds"};  // of the report
+
+std::vector<std::string> columns(bool with_noise) {
+  std::vector<std::string> names;
+  for (const char* quantity : {"strain", "stress"}) {
+    for (const char* component : kPathComponents) names.push_back(fmt::format("{}_{}", quantity, component));
+  }
+  for (int i = 1; i <= 3; ++i) {
+    for (int j = 1; j <= 3; ++j) names.push_back(fmt::format("F_{}{}", i, j));
+  }
+  for (const std::string_view field : kReportFields) {
+    if (std::find(kLeftOut.begin(), kLeftOut.end(), field) == kLeftOut.end()) names.emplace_back(field);
+  }
+  if (with_noise) names.emplace_back("stress_noise");
+  return names;
+}
+
+std::vector<double> values(const Tensor2& F, const Response& response) {
+  const PathVector strain = path_strain(F), stress = path_components(response.stress);
+  std::vector<double> row(strain.begin(), strain.end());
+  row.insert(row.end(), stress.begin(), stress.end());
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) row.push_back(F(i, j));
+  }
+  for (const std::string_view field : kReportFields) {
+    if (std::find(kLeftOut.begin(), kLeftOut.end(), field) == kLeftOut.end()) row.push_back(response.report[field]);
+  }
+  return row;
+}
+
+/// The steps along the segments and the files that they fill.
+class Path {
+ public:
+  Path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples);
+  int go();
+
+ private:
+  bool segment(std::size_t number);
+  bool step(double fraction, double time);
+  void record_row();
+  int finish(int status, const std::string& message);
+  double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  const Case& case_;
+  const RunOptions& options_;
+  int noise_samples_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  SolverParameters parameters_;
+  PathDriver driver_;
+  Log log_;
+  History history_;
+  Summary summary_;
+  StepRecord record_;  // of the step under way, rejected attempts included
+  PathStep last_;
+  double last_noise_ = 0, largest_noise_ = 0;
+};
+
+const std::filesystem::path& prepared(const RunOptions& options) {
+  prepare_output_folder(options.folder, options.existing);
+  return options.folder;
+}
+
+Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples)
+    : case_(c),
+      options_(options),
+      noise_samples_(noise_samples),
+      parameters_(with_default_tolerances(c.solver, c.material.type == MaterialType::volume_element)),
+      driver_(point, parameters_),
+      log_(prepared(options) / "log.txt", options.existing),
+      history_(options.folder / "history.csv", columns(noise_samples > 0), options.existing) {
+  replace_file(options.folder / "case.toml", effective_toml(c));
+  summary_.case_hash = case_hash(c);
+  summary_.command_line = options.command_line;
+  summary_.versions = options.versions;
+}
+
+int Path::go() {
+  log_.say(fmt::format("{}: one material point, {} segment{}", case_.file, case_.path.size(),
+                       case_.path.size() > 1 ? "s" : ""));
+  record_row();
+  try {
+    for (std::size_t s = 0; s < case_.path.size(); ++s) {
+      if (segment(s)) continue;
+      return finish(last_.failure ? kPointFailed : kNotConverged,
+                    fmt::format("stopped after step {}, {:.3g} % along segment {}, all steps up to it are in {}: {}",
+                                summary_.steps, 100 * (record_.time - static_cast<double>(s)), s + 1,
+                                options_.folder.string(), last_.reason));
+    }
+  } catch (const std::exception& error) {
+    finish(kPointFailed, error.what());
+    throw;
+  }
+  const std::string noise = noise_samples_ > 0 ? fmt::format(
+                                                     "; stress noise at most {:.1e} of |stress| at strains "
+                                                     "within {:.0e}, tolerance {:.1e}",
+                                                     largest_noise_, parameters_.qn_noise, parameters_.tolerance)
+                                               : "";
+  return finish(kDone, fmt::format("{} steps, {} evaluations{}", summary_.steps, summary_.evaluations, noise));
+}
+
+/// Increments of one segment, cut where they fail; false when the smallest one fails too.
+bool Path::segment(std::size_t number) {
+  const double increment = 1.0 / case_.path[number].increments;
+  double done = 0, size = increment;
+  driver_.begin_segment(case_.path[number]);
+  while (done < 1 - kRoundOff) {
+    const double next = done + size > 1 - kRoundOff ? 1 : done + size;
+    if (step(next, static_cast<double>(number) + next)) {
+      done = next;
+      size = std::min(size * case_.control.growth, increment);
+      continue;
+    }
+    size = (next - done) * case_.control.cut;
+    log_.say(fmt::format("step {} rejected: {}", summary_.steps + 1, last_.reason));
+    record_.time = static_cast<double>(number) + done;
+    if (size < kSmallestFraction * increment) return false;
+  }
+  return true;
+}
+
+bool Path::step(double fraction, double time) {
+  last_ = driver_.solve(fraction);
+  std::vector<IterationRecord> table;
+  for (const PathIteration& i : last_.table) {
+    table.push_back(
+        {static_cast<int>(table.size()) + 1, i.residual, i.correction, i.engine_seconds, i.engine_seconds, 0, 0, ""});
+    record_.dem_steps += i.dem_steps;
+    record_.dem_seconds += i.engine_seconds;
+    summary_.evaluate_seconds += i.seconds;
+  }
+  record_.evaluations += static_cast<int>(table.size());
+  if (!last_.converged) return false;
+  if (noise_samples_ > 0) last_noise_ = driver_.noise(parameters_.qn_noise, noise_samples_);
+  largest_noise_ = std::max(largest_noise_, last_noise_);
+  driver_.commit();
+  record_.time = time;
+  record_.load_factor = time / static_cast<double>(case_.path.size());
+  record_.iterations = static_cast<int>(table.size());
+  record_.residual = last_.table.back().residual;
+  record_.step = ++summary_.steps;
+  const StepRecord row = record_;
+  record_row();
+  log_.step(row, table, row.load_factor);
+  return true;
+}
+
+/// The committed state as a row of history.csv, and into the sums.
+void Path::record_row() {
+  record_.wall_seconds = wall();
+  record_.monitors = values(driver_.F(), driver_.response());
+  if (noise_samples_ > 0) record_.monitors.push_back(last_noise_);
+  history_.add(record_);
+  summary_.evaluations += record_.evaluations;
+  summary_.dem_steps += record_.dem_steps;
+  summary_.engine_seconds += record_.dem_seconds;
+  record_ = {};
+}
+
+int Path::finish(int status, const std::string& message) {
+  summary_.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
+  summary_.message = message;
+  summary_.exit_status = status;
+  summary_.wall_seconds = wall();
+  summary_.trial_seconds = summary_.evaluate_seconds;
+  summary_.peak_memory_master = peak_memory();
+  options_.complete(summary_);
+  write_summary(options_.folder / "summary.json", summary_);
+  log_.say(fmt::format("{}: {}", summary_.status, message));
+  return status;
+}
+
+/// Largest shortening (or lengthening) that the loads prescribe along y at the end, over the rectangle's height.
+double axial_strain(const Case& c) {
+  double strain = 0;
+  for (const Load& load : c.loads) {
+    const bool moves = load.kind == LoadKind::displacement || load.kind == LoadKind::velocity;
+    if (!moves || load.component != Component::y || c.mesh.type != MeshType::rectangle) continue;
+    const double e = load.value * load_factor(load, c.control.end_time, c.control.end_time) / c.mesh.height;
+    if (std::abs(e) > std::abs(strain) && e > -1) strain = e;
+  }
+  return strain != 0 ? std::log1p(strain) : std::log(0.95);
+}
+
+double lateral_pressure(const Case& c) {
+  for (const Load& load : c.loads) {
+    if (load.kind == LoadKind::pressure) return load.value;
+  }
+  return c.material.type == MaterialType::volume_element ? c.ve.confining_stress : c.material.initial_pressure;
+}
+
+}  // namespace
+
+PathSegment biaxial_path(const Case& c) {
+  PathSegment segment;
+  segment.stress[0] = -lateral_pressure(c);
+  segment.strain[1] = axial_strain(c);
+  segment.increments = std::max(1, static_cast<int>(std::lround(std::abs(segment.strain[1]) / kStrainIncrement)));
+  return segment;
+}
+
+Case read_path_case(const std::string& file, const std::vector<std::string>& overrides) {
+  try {
+    return read_case(file, overrides, Purpose::ve_path);
+  } catch (const UserError&) {
+    // Perhaps nothing is wrong but that a boundary value problem has no path.
+    Case c;
+    try {
+      c = read_case(file, overrides, Purpose::run);
+    } catch (const UserError&) {
+    }
+    if (c.file.empty() || !c.path.empty()) throw;
+    c.path = {biaxial_path(c)};
+    return c;
+  }
+}
+
+std::unique_ptr<MaterialPoints> make_analytic_point(const Case& c) {
+  return std::make_unique<AnalyticPoints>(std::vector<AnalyticLaw>{make_law(c.material)});
+}
+
+int follow_path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples) {
+  return Path(c, point, options, noise_samples).go();
+}
+
+}  // namespace femxdem

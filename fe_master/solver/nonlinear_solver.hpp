@@ -1,0 +1,123 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acceleration.hpp"
+#include "assembler.hpp"
+#include "control.hpp"
+#include "element.hpp"
+#include "linear_solver.hpp"
+#include "loads.hpp"
+#include "material_points.hpp"
+#include "point_operators.hpp"
+#include "solver_parameters.hpp"
+
+namespace femxdem {
+
+/// One equilibrium iteration: one evaluation of all points (and its probes), and the correction that it asks for.
+struct Iteration {
+  double residual = 0;    ///< free forces over reactions and external forces [-]
+  double correction = 0;  ///< displacement correction over the step's displacement [-]
+  double gap = 0;         ///< constraints: second gradient over the step's micro gradient, measure over its change [-]
+  int element = 0;        ///< whose nodes are farthest out of balance
+  double engine_seconds = 0;    ///< inside the DEM engine, all points [s]
+  double longest_point = 0;     ///< the busiest point [s]
+  double evaluate_seconds = 0;  ///< wall time of the evaluation [s]
+  double solve_seconds = 0;     ///< wall time of assembly and solution [s]
+  std::string note;             ///< what was special about it; mostly empty
+};
+
+/// What became of a step.
+struct StepResult {
+  bool converged = false;
+  bool best_accepted = false;  ///< accepted above the tolerance, below accept_best_factor times it
+  int evaluations = 0;         ///< VE evaluations: every point strained once
+  double dem_steps = 0;        ///< DEM steps of all points
+  std::vector<Iteration> table;
+  std::string reason;              ///< why it did not converge, one sentence
+  std::optional<Failure> failure;  ///< of a point, when that is the reason
+
+  int iterations() const { return static_cast<int>(table.size()); }
+};
+
+/// A state in equilibrium.
+struct Equilibrium {
+  double time = 0;              ///< [s]
+  Eigen::VectorXd x;            ///< unknowns (Element)
+  Eigen::VectorXd multipliers;  ///< of the constraints (Element)
+  double load_factor = 0;       ///< of the released loads (Loads::release) [-]
+  std::vector<Tensor2> F;
+  std::vector<Response> responses;
+  Eigen::VectorXd internal, external;  ///< nodal forces of all unknowns [N/m]; their difference is the reaction
+};
+
+/// Equilibrium of the finite elements with their material points, step by step.
+///
+/// Every trial strains the points from their committed state by the step's total increment; a step that fails leaves
+/// no trace, and the trial that satisfied equilibrium is the state that is committed.
+class NonlinearSolver {
+ public:
+  /// Evaluates the undeformed state. Throws UserError when a point cannot answer it.
+  NonlinearSolver(Element& element, MaterialPoints& points, const Loads& loads, const SolverParameters& parameters);
+
+  /// Solves the step from the committed state to time t_n + dt and commits it if it converges. With a target, the
+  /// factor of the released loads is an unknown and the measure's value the equation for it.
+  StepResult solve_step(double dt, const std::optional<MeasureTarget>& target = {});
+
+  const Equilibrium& committed() const { return committed_; }
+  const PointOperators& operators() const { return operators_; }
+  /// Out-of-balance force of a state over its reactions and external forces [-].
+  double relative_residual(const Equilibrium& state) const;
+  /// The same of the nodes of each element.
+  std::vector<double> element_residuals(const Equilibrium& state) const;
+
+  void save(NamedArrays& arrays) const;
+  /// Goes on from saved arrays; the points must have been loaded before.
+  void load(const NamedArrays& arrays);
+
+ private:
+  void begin_step(Equilibrium& trial, double dt);
+  void predict(Equilibrium& trial, double dt);
+  void start_at_random(Equilibrium& trial) const;
+  bool evaluate(Equilibrium& trial, StepResult& result);
+  struct Correction {
+    Eigen::VectorXd x;
+    double load_factor = 0;
+  };
+  std::optional<Correction> correction(const Equilibrium& at, const Eigen::VectorXd& x, const Eigen::VectorXd& residual,
+                                       const Eigen::VectorXd& change);
+  bool add_load_factor(const Eigen::VectorXd& x, Correction& c) const;
+  double gap(const Equilibrium& trial) const;
+  std::optional<Eigen::VectorXd> correct(const Equilibrium& trial, Iteration& now);
+  Eigen::VectorXd unknowns(const Equilibrium& trial) const;
+  void move(Equilibrium& trial, const Eigen::VectorXd& z);
+  AndersonAcceleration acceleration() const;
+  bool converged(const Iteration& iteration) const;
+  bool accept_best(Equilibrium& best, StepResult& result);
+  void commit(Equilibrium& trial, double dt);
+  Eigen::VectorXd scaled_residual(const Equilibrium& state) const;
+  std::vector<double> of_elements(const Eigen::VectorXd& residual) const;
+
+  Element& element_;
+  MaterialPoints& points_;
+  const Loads& loads_;
+  SolverParameters parameters_;
+  std::vector<int> prescribed_;
+  Assembler assembler_;
+  LinearSolver linear_solver_;
+  bool factorised_in_step_ = false;
+  Equilibrium committed_;
+  Eigen::VectorXd last_external_change_;  // of the last committed step
+  double last_dt_ = 0;
+  double last_factor_change_ = 0;
+  std::optional<MeasureTarget> target_;  // of the step under way
+  PointOperators operators_;
+};
+
+/// The tolerances of a case, or the defaults where it gives none: 5e-3 (force) and 0.1 (displacement) for volume
+/// elements, whose noise allows no less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
+SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements);
+
+}  // namespace femxdem

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "given.hpp"
+
+namespace femxdem {
+
+enum class GlobalOperator { quasi_newton, elastic, tangent, perturbation };
+enum class Refresh { frozen, step, iteration };
+enum class Predictor { extrapolate, none };
+enum class Acceleration { none, anderson };
+struct SolverParameters {
+  GlobalOperator global_operator = GlobalOperator::quasi_newton;
+  Refresh refresh = Refresh::step;  ///< when the elastic operator is asked for anew
+  double operator_scale = 1.0;      ///< factor on the elastic operator [-]
+  Predictor predictor = Predictor::extrapolate;
+  double tolerance = kNotGiven;               ///< force residual / reaction and external scale [-]
+  double displacement_tolerance = kNotGiven;  ///< correction / displacement of the step [-]
+  int max_iterations = 15;
+  double accept_best_factor = 1.0;  ///< best iterate accepted below this times the tolerance, and flagged [-]
+  Acceleration acceleration = Acceleration::none;
+  int anderson_depth = 5;
+  double anderson_truncation = 1e-2;  ///< least diagonal entry of the triangular factor over the largest [-]
+  bool line_search = false;
+  double noise = 0.0;    ///< relative jitter of the stress of a volume element, measured; 0: not known [-]
+  double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
+  double qn_max = 1.2;
+  double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
+  double qn_first = kNotGiven;   ///< weight of what a step's first trial teaches against the committed state [-]
+  double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
+  double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
+  double start_time = 0.0;       ///< of the step that goes beyond this time [s]
+  int start_seed = 1;
+  double penalty = 1e4;  ///< augmented Lagrangian: r / Young-like modulus of the element [-]
+};
+
+}  // namespace femxdem
