@@ -3,22 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "analytic_points.hpp"
 #include "errors.hpp"
-#include "history.hpp"
-#include "log.hpp"
 #include "nonlinear_solver.hpp"
 #include "path_driver.hpp"
+#include "step_size.hpp"
 
 namespace femxdem {
 namespace {
 
 constexpr double kStrainIncrement = 1e-3;   // of the default path
 constexpr double kSmallestFraction = 1e-3;  // of a segment's increment: below it the path ends
-constexpr double kRoundOff = 1e-9;          // of a segment
 const std::array<std::string_view, 3> kLeftOut = {"dem_steps", "seconds", "engine_seconds"};  // of the report
 
 std::vector<std::string> columns(bool with_noise) {
@@ -59,27 +56,17 @@ class Path {
   bool segment(std::size_t number);
   bool step(double fraction, double time);
   void record_row();
-  int finish(int status, const std::string& message);
-  double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   const Case& case_;
   const RunOptions& options_;
   int noise_samples_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   SolverParameters parameters_;
   PathDriver driver_;
-  Log log_;
-  History history_;
-  Summary summary_;
+  RunFiles files_;
   StepRecord record_;  // of the step under way, rejected attempts included
   PathStep last_;
   double last_noise_ = 0, largest_noise_ = 0;
 };
-
-const std::filesystem::path& prepared(const RunOptions& options) {
-  prepare_output_folder(options.folder, options.existing);
-  return options.folder;
-}
 
 Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples)
     : case_(c),
@@ -87,28 +74,25 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
       noise_samples_(noise_samples),
       parameters_(with_default_tolerances(c.solver, c.material.type == MaterialType::volume_element)),
       driver_(point, parameters_),
-      log_(prepared(options) / "log.txt", options.existing),
-      history_(options.folder / "history.csv", columns(noise_samples > 0), options.existing) {
-  replace_file(options.folder / "case.toml", effective_toml(c));
-  summary_.case_hash = case_hash(c);
-  summary_.command_line = options.command_line;
-  summary_.versions = options.versions;
+      files_(c, options) {
+  files_.begin_history(columns(noise_samples > 0));
 }
 
 int Path::go() {
-  log_.say(fmt::format("{}: one material point, {} segment{}", case_.file, case_.path.size(),
-                       case_.path.size() > 1 ? "s" : ""));
+  files_.log.say(fmt::format("{}: one material point, {} segment{}", case_.file, case_.path.size(),
+                             case_.path.size() > 1 ? "s" : ""));
   record_row();
   try {
     for (std::size_t s = 0; s < case_.path.size(); ++s) {
       if (segment(s)) continue;
-      return finish(last_.failure ? kPointFailed : kNotConverged,
-                    fmt::format("stopped after step {}, {:.3g} % along segment {}, all steps up to it are in {}: {}",
-                                summary_.steps, 100 * (record_.time - static_cast<double>(s)), s + 1,
-                                options_.folder.string(), last_.reason));
+      return files_.finish(
+          last_.failure ? kPointFailed : kNotConverged,
+          fmt::format("stopped after step {}, {:.3g} % along segment {}, all steps up to it are in {}: {}",
+                      files_.summary.steps, 100 * (record_.time - static_cast<double>(s)), s + 1,
+                      options_.folder.string(), last_.reason));
     }
   } catch (const std::exception& error) {
-    finish(kPointFailed, error.what());
+    files_.finish(kPointFailed, error.what());
     throw;
   }
   const std::string noise = noise_samples_ > 0 ? fmt::format(
@@ -116,25 +100,27 @@ int Path::go() {
                                                      "within {:.0e}, tolerance {:.1e}",
                                                      largest_noise_, parameters_.qn_noise, parameters_.tolerance)
                                                : "";
-  return finish(kDone, fmt::format("{} steps, {} evaluations{}", summary_.steps, summary_.evaluations, noise));
+  return files_.finish(
+      kDone, fmt::format("{} steps, {} evaluations{}", files_.summary.steps, files_.summary.evaluations, noise));
 }
 
 /// Increments of one segment, cut where they fail; false when the smallest one fails too.
 bool Path::segment(std::size_t number) {
   const double increment = 1.0 / case_.path[number].increments;
-  double done = 0, size = increment;
+  StepSize size({increment, kSmallestFraction * increment, increment, case_.control.growth, case_.control.cut}, 1);
+  double done = 0;
   driver_.begin_segment(case_.path[number]);
-  while (done < 1 - kRoundOff) {
-    const double next = done + size > 1 - kRoundOff ? 1 : done + size;
+  while (!size.done(done)) {
+    const double next = done + size.next(done);
     if (step(next, static_cast<double>(number) + next)) {
       done = next;
-      size = std::min(size * case_.control.growth, increment);
+      size.accepted(true);
       continue;
     }
-    size = (next - done) * case_.control.cut;
-    log_.say(fmt::format("step {} rejected: {}", summary_.steps + 1, last_.reason));
+    size.rejected();
+    files_.log.say(fmt::format("step {} rejected: {}", files_.summary.steps + 1, last_.reason));
     record_.time = static_cast<double>(number) + done;
-    if (size < kSmallestFraction * increment) return false;
+    if (size.exhausted()) return false;
   }
   return true;
 }
@@ -147,7 +133,8 @@ bool Path::step(double fraction, double time) {
         {static_cast<int>(table.size()) + 1, i.residual, i.correction, i.engine_seconds, i.engine_seconds, 0, 0, ""});
     record_.dem_steps += i.dem_steps;
     record_.dem_seconds += i.engine_seconds;
-    summary_.evaluate_seconds += i.seconds;
+    files_.summary.evaluate_seconds += i.seconds;
+    files_.summary.trial_seconds += i.seconds;
   }
   record_.evaluations += static_cast<int>(table.size());
   if (!last_.converged) return false;
@@ -158,36 +145,20 @@ bool Path::step(double fraction, double time) {
   record_.load_factor = time / static_cast<double>(case_.path.size());
   record_.iterations = static_cast<int>(table.size());
   record_.residual = last_.table.back().residual;
-  record_.step = ++summary_.steps;
+  record_.step = ++files_.summary.steps;
   const StepRecord row = record_;
   record_row();
-  log_.step(row, table, row.load_factor);
+  files_.log.step(row, table, row.load_factor);
   return true;
 }
 
 /// The committed state as a row of history.csv, and into the sums.
 void Path::record_row() {
-  record_.wall_seconds = wall();
+  record_.wall_seconds = files_.wall();
   record_.monitors = values(driver_.F(), driver_.response());
   if (noise_samples_ > 0) record_.monitors.push_back(last_noise_);
-  history_.add(record_);
-  summary_.evaluations += record_.evaluations;
-  summary_.dem_steps += record_.dem_steps;
-  summary_.engine_seconds += record_.dem_seconds;
+  files_.add(record_);
   record_ = {};
-}
-
-int Path::finish(int status, const std::string& message) {
-  summary_.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
-  summary_.message = message;
-  summary_.exit_status = status;
-  summary_.wall_seconds = wall();
-  summary_.trial_seconds = summary_.evaluate_seconds;
-  summary_.peak_memory_master = peak_memory();
-  options_.complete(summary_);
-  write_summary(options_.folder / "summary.json", summary_);
-  log_.say(fmt::format("{}: {}", summary_.status, message));
-  return status;
 }
 
 /// Largest shortening (or lengthening) that the loads prescribe along y at the end, over the rectangle's height.
@@ -240,6 +211,7 @@ std::unique_ptr<MaterialPoints> make_analytic_point(const Case& c) {
 }
 
 int follow_path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples) {
+  prepare_output_folder(options.folder, options.existing);
   return Path(c, point, options, noise_samples).go();
 }
 

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "case.hpp"
 #include "material_points.hpp"
-#include "time_loop.hpp"
+#include "run_files.hpp"
 
 namespace femxdem {
 

@@ -2,290 +2,209 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <numbers>
-
-#include "analytic_points.hpp"
 #include "checkpoint.hpp"
-#include "errors.hpp"
-#include "history.hpp"
-#include "log.hpp"
+#include "field_output.hpp"
 #include "monitors.hpp"
-#include "nonlinear_solver.hpp"
-#include "point_fields.hpp"
-#include "results.hpp"
-#include "second_gradient_q8.hpp"
+#include "step_size.hpp"
 #include "warnings.hpp"
 
 namespace femxdem {
 namespace {
 
-constexpr double kTimeRoundOff = 1e-9;  // of the end time: a step that would leave less goes to the end
-
 /// The time loop of one run and the files that it fills.
-class Run {
+class TimeLoop {
  public:
-  Run(Problem& problem, MaterialPoints& points, const RunOptions& options);
+  TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed);
   int go();
 
  private:
   int advance();
-  bool step();
+  void step();
+  std::vector<IterationRecord> note_attempt(const StepResult& result);
+  void reject(double time, const std::vector<IterationRecord>& table);
+  void accept(Equilibrium start, const std::vector<IterationRecord>& table);
   void restart();
   void write_fields();
   void write_state();
-  void finish(int status, const std::string& message);
   std::string place(std::size_t point) const;
-  double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   Problem& problem_;
   const Case& case_;
   const RunOptions& options_;
   MaterialPoints& points_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  bool prepared_;  // the folder, before any file in it
   Checkpoint resumed_;
-  Log log_;
-  StepControl control_;
+  RunFiles files_;
   NonlinearSolver& solver_;
-  History history_;
+  StepControl control_;
   Results results_;
   Equilibrium before_;  // the committed state before the last step
-  double dt_;
-  Summary summary_;
+  StepSize size_;
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
 };
 
-/// A step that would leave less than half of itself is half of what is left: a tiny last step is a hold for the volume
-/// elements, whose stress relaxes in it.
-double without_crumb(double dt, double left) { return left < 1.5 * dt ? 0.5 * left : dt; }
-
-bool prepare(const RunOptions& options) {
-  prepare_output_folder(options.folder, options.existing);
-  return true;
-}
-
-std::vector<Point2> positions(const Element& element) {
-  std::vector<Point2> X;
-  for (std::size_t p = 0; p < element.points(); ++p) X.push_back(element.shapes(p).X);
-  return X;
-}
-
-Checkpoint find_checkpoint(const Case& c, const RunOptions& options) {
-  if (options.existing != Existing::resume) return {};
-  return read_checkpoint(options.folder / "checkpoint.h5", case_hash(c), options.versions);
-}
-
-Run::Run(Problem& problem, MaterialPoints& points, const RunOptions& options)
+TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed)
     : problem_(problem),
       case_(problem.parameters()),
       options_(options),
       points_(points),
-      prepared_(prepare(options)),
-      resumed_(find_checkpoint(case_, options)),
-      log_(options.folder / "log.txt", options.existing),
-      control_(case_.control, problem.mesh()),
+      resumed_(std::move(resumed)),
+      files_(case_, options),
       solver_(problem.start(points)),
-      history_(options.folder / "history.csv", monitor_names(case_), options.existing, resumed_.step),
-      results_(options.folder, problem.mesh(), positions(problem.element()), options.existing, resumed_.step),
-      dt_(case_.control.step) {
-  replace_file(options.folder / "case.toml", effective_toml(case_));
-  summary_.ranks = options.ranks;
-  summary_.case_hash = case_hash(case_);
-  summary_.command_line = options.command_line;
-  summary_.versions = options.versions;
+      control_(case_.control, problem.mesh()),
+      results_(options.folder, problem.mesh(), point_positions(problem.element()), options.existing, resumed_.step),
+      size_(
+          {case_.control.step, case_.control.min_step, case_.control.max_step, case_.control.growth, case_.control.cut},
+          case_.control.end_time) {
+  files_.begin_history(monitor_names(case_), resumed_.step);
 }
 
-int Run::go() {
-  log_.say(fmt::format("{}: {} elements, {} material points, {} unknowns, {} rank{}", case_.file,
-                       problem_.mesh().elements.size(), points_.size(), problem_.element().unknowns(), options_.ranks,
-                       options_.ranks > 1 ? "s" : ""));
-  for (const std::string& warning : warnings(case_, problem_.mesh())) log_.say("warning: " + warning);
+int TimeLoop::go() {
+  files_.log.say(fmt::format("{}: {} elements, {} material points, {} unknowns, {} rank{}", case_.file,
+                             problem_.mesh().elements.size(), points_.size(), problem_.element().unknowns(),
+                             options_.ranks, options_.ranks > 1 ? "s" : ""));
+  for (const std::string& warning : warnings(case_, problem_.mesh())) files_.log.say("warning: " + warning);
   before_ = solver_.committed();
   if (options_.existing == Existing::resume) {
     restart();
   } else {
-    log_.say(fmt::format("start: out-of-balance force {:.1e} of the loads", solver_.relative_residual(before_)));
+    files_.log.say(fmt::format("start: out-of-balance force {:.1e} of the loads", solver_.relative_residual(before_)));
     write_fields();
   }
-  int status = kNotConverged;
-  std::string message;
   try {
-    status = advance();
-    message = status == kDone
-                  ? fmt::format("{} steps to time {:g}", summary_.steps, solver_.committed().time)
-                  : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}", summary_.steps,
-                                solver_.committed().time, options_.folder.string(), last_.reason);
+    const int status = advance();
+    const double time = solver_.committed().time;
+    const std::string message = status == kDone
+                                    ? fmt::format("{} steps to time {:g}", files_.summary.steps, time)
+                                    : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
+                                                  files_.summary.steps, time, options_.folder.string(), last_.reason);
+    return files_.finish(status, message);
   } catch (const std::exception& error) {
-    finish(kPointFailed, error.what());
+    files_.finish(kPointFailed, error.what());
     throw;
   }
-  finish(status, message);
-  return status;
 }
 
-int Run::advance() {
-  const double end = case_.control.end_time;
+int TimeLoop::advance() {
   int status = kDone;
-  while (status == kDone && solver_.committed().time < end * (1 - kTimeRoundOff)) {
-    if (!step() && dt_ < case_.control.min_step) status = last_.failure ? kPointFailed : kNotConverged;
+  while (status == kDone && !size_.done(solver_.committed().time)) {
+    step();
+    if (!last_.converged && size_.exhausted()) status = last_.failure ? kPointFailed : kNotConverged;
   }
-  if (summary_.steps % case_.output.every != 0) write_fields();
+  if (files_.summary.steps % case_.output.every != 0) write_fields();
   return status;
 }
 
 /// One attempt; on success everything about it is on the disk.
-bool Run::step() {
-  const double end = case_.control.end_time, time = solver_.committed().time;
-  const bool to_the_end = time + dt_ > end * (1 - kTimeRoundOff);
-  const double dt = to_the_end ? end - time : without_crumb(dt_, end - time);
+void TimeLoop::step() {
   Equilibrium start = solver_.committed();
+  const double dt = size_.next(start.time);
   last_ = solver_.solve_step(dt, control_.target(start, dt));
-  record_.evaluations += last_.evaluations;
-  record_.dem_steps += last_.dem_steps;
+  const std::vector<IterationRecord> table = note_attempt(last_);
+  if (last_.converged) {
+    accept(std::move(start), table);
+  } else {
+    reject(start.time + dt, table);
+  }
+}
+
+std::vector<IterationRecord> TimeLoop::note_attempt(const StepResult& result) {
+  record_.evaluations += result.evaluations;
+  record_.dem_steps += result.dem_steps;
   std::vector<IterationRecord> table;
-  for (const Iteration& i : last_.table) {
+  for (const Iteration& i : result.table) {
     record_.dem_seconds += i.engine_seconds;
-    summary_.evaluate_seconds += i.evaluate_seconds;
+    files_.summary.evaluate_seconds += i.evaluate_seconds;
     table.push_back({static_cast<int>(table.size()) + 1, i.residual, i.correction, i.longest_point,
                      i.engine_seconds / static_cast<double>(points_.size()), i.solve_seconds, i.element, i.note});
   }
-  if (!last_.converged) {
-    const bool passes_on = control_.rejected();
-    dt_ = passes_on ? dt : dt * case_.control.cut;
-    const std::string next = passes_on                      ? "; again, driven by the " + control_.description()
-                             : dt_ < case_.control.min_step ? ""
-                                                            : fmt::format("; again with a step of {:.3g}", dt_);
-    log_.say(fmt::format("step {} to time {:.6g} rejected: {}{}", summary_.steps + 1, time + dt, last_.reason, next));
-    for (const IterationRecord& i : table) {
-      log_.note(fmt::format("  {:3} |r|/|f| {:.2e} |du|/|u| {:.2e} element {} {}", i.iteration, i.residual,
-                            i.correction, i.element, i.note));
-    }
-    if (last_.failure) log_.say(fmt::format("  {}: {}", place(last_.failure->point), last_.failure->advice));
-    return false;
-  }
-  if (control_.accepted(start, solver_.committed()))
-    log_.say(fmt::format("limit point near: the load factor is now found by the {}", control_.description()));
-  before_ = std::move(start);
-  const Equilibrium& now = solver_.committed();
-  record_.step = summary_.steps + 1;
-  record_.time = now.time;
-  record_.load_factor = case_.control.mode == ControlMode::time ? now.time / end : now.load_factor;
-  record_.iterations = last_.iterations();
-  record_.residual = last_.table.back().residual;
-  record_.wall_seconds = wall();
-  record_.monitors = monitor_values(case_, problem_.element(), now);
-  history_.add(record_);
-  log_.step(record_, table, now.time / end);
-  if (last_.best_accepted)
-    log_.say(fmt::format("step {} accepted above the tolerance: residual {:.1e}", record_.step, record_.residual));
-  summary_.evaluations += record_.evaluations;
-  summary_.dem_steps += record_.dem_steps;
-  summary_.engine_seconds += record_.dem_seconds;
-  const bool quick = last_.iterations() <= case_.control.max_iterations_to_grow;
-  if (quick && !to_the_end) dt_ = std::min(dt * case_.control.growth, case_.control.max_step);
-  const int step = record_.step;
-  record_ = {};
-  summary_.steps = step;
-  if (step % case_.output.every == 0) write_fields();
-  if (case_.output.checkpoint_every > 0 && step % case_.output.checkpoint_every == 0) write_state();
-  return true;
+  return table;
 }
 
-std::string Run::place(std::size_t point) const {
+void TimeLoop::reject(double time, const std::vector<IterationRecord>& table) {
+  const bool passes_on = control_.rejected();
+  passes_on ? size_.again() : size_.rejected();
+  const std::string next = passes_on           ? "; again, driven by the " + control_.description()
+                           : size_.exhausted() ? ""
+                                               : fmt::format("; again with a step of {:.3g}", size_.size());
+  files_.log.say(
+      fmt::format("step {} to time {:.6g} rejected: {}{}", files_.summary.steps + 1, time, last_.reason, next));
+  for (const IterationRecord& i : table) {
+    files_.log.note(fmt::format("  {:3} |r|/|f| {:.2e} |du|/|u| {:.2e} element {} {}", i.iteration, i.residual,
+                                i.correction, i.element, i.note));
+  }
+  if (last_.failure) files_.log.say(fmt::format("  {}: {}", place(last_.failure->point), last_.failure->advice));
+}
+
+void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& table) {
+  const Equilibrium& now = solver_.committed();
+  if (control_.accepted(start, now))
+    files_.log.say(fmt::format("limit point near: the load factor is now found by the {}", control_.description()));
+  before_ = std::move(start);
+  const double done = now.time / case_.control.end_time;
+  record_.step = ++files_.summary.steps;
+  record_.time = now.time;
+  record_.load_factor = case_.control.mode == ControlMode::time ? done : now.load_factor;
+  record_.iterations = last_.iterations();
+  record_.residual = last_.table.back().residual;
+  record_.wall_seconds = files_.wall();
+  record_.monitors = monitor_values(case_, problem_.element(), now);
+  files_.add(record_);
+  files_.log.step(record_, table, done);
+  if (last_.best_accepted)
+    files_.log.say(
+        fmt::format("step {} accepted above the tolerance: residual {:.1e}", record_.step, record_.residual));
+  size_.accepted(last_.iterations() <= case_.control.max_iterations_to_grow);
+  record_ = {};
+  if (files_.summary.steps % case_.output.every == 0) write_fields();
+  const int checkpoint_every = case_.output.checkpoint_every;
+  if (checkpoint_every > 0 && files_.summary.steps % checkpoint_every == 0) write_state();
+}
+
+std::string TimeLoop::place(std::size_t point) const {
   const Point2& X = problem_.element().shapes(point).X;
   return fmt::format("material point {} (element {}, at {:.4g}, {:.4g} m)", point, point / kPointsPerElement, X.x(),
                      X.y());
 }
 
-void Run::write_fields() {
-  const Equilibrium& now = solver_.committed();
-  const Mesh& mesh = problem_.mesh();
-  std::vector<Tensor2> stress, stress_before;
-  std::vector<PointReport> reports;
-  for (const Response& r : now.responses) {
-    stress.push_back(r.stress);
-    reports.push_back(r.report);
-  }
-  for (const Response& r : before_.responses) stress_before.push_back(r.stress);
-  FieldStep fields{
-      summary_.steps, now.time, now.time / case_.control.end_time, {}, point_fields(now.F, stress, reports)};
-  fields.point_fields.push_back(second_order_work(before_.F, stress_before, now.F, stress));
-  fields.point_fields.push_back({"least_tangent_eigenvalue", 1, solver_.operators().least_eigenvalues()});
-  if (auto values = solver_.operators().acoustic_determinants(now.F, now.responses); !values.empty())
-    fields.point_fields.push_back({"acoustic_determinant", 1, std::move(values)});
-  Field element_residual{"element_residual", 1, {}};
-  for (const double value : solver_.element_residuals(now))
-    element_residual.values.insert(element_residual.values.end(), kPointsPerElement, value);
-  fields.point_fields.push_back(std::move(element_residual));
-  Field displacement{"displacement", 2, {}};
-  Field residual{"residual", 2, {}};
-  Eigen::VectorXd out_of_balance = now.external - now.internal;
-  for (const int dof : problem_.loads().prescribed_dofs()) out_of_balance[dof] = 0;  // reactions
-  for (std::size_t i = 0; i < 2 * mesh.nodes.size(); ++i) {
-    displacement.values.push_back(now.x[static_cast<Eigen::Index>(i)]);
-    residual.values.push_back(out_of_balance[static_cast<Eigen::Index>(i)]);
-  }
-  fields.node_fields = {displacement, residual};
-  if (const auto* second_gradient = dynamic_cast<const SecondGradientQ8*>(&problem_.element())) {
-    Field v{"micro_gradient", 4, {}}, double_stress{"double_stress", 8, {}};
-    for (std::size_t n = 0; n < mesh.nodes.size(); ++n) {
-      const Eigen::Vector4d value = second_gradient->micro_gradient(static_cast<int>(n));
-      v.values.insert(v.values.end(), value.data(), value.data() + 4);
-    }
-    for (std::size_t p = 0; p < problem_.element().points(); ++p) {
-      const DoubleStress& value = second_gradient->double_stress(p);
-      double_stress.values.insert(double_stress.values.end(), value.data(), value.data() + 8);
-    }
-    fields.node_fields.push_back(std::move(v));
-    fields.point_fields.push_back(std::move(double_stress));
-  }
-  results_.write(fields);
+void TimeLoop::write_fields() {
+  results_.write(field_step(files_.summary.steps, case_.control.end_time, problem_, before_));
 }
 
-void Run::write_state() {
-  Checkpoint checkpoint{summary_.steps, solver_.committed().time, dt_, {}, {}, summary_.case_hash, options_.versions};
+void TimeLoop::write_state() {
+  Checkpoint checkpoint{files_.summary.steps,     solver_.committed().time, size_.size(), {}, {},
+                        files_.summary.case_hash, options_.versions};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
-  checkpoint.arrays.emplace_back("run.counts",
-                                 std::vector<double>{static_cast<double>(summary_.evaluations), summary_.dem_steps});
+  checkpoint.arrays.emplace_back(
+      "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
   checkpoint.states = points_.save();
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
-  log_.note(fmt::format("checkpoint after step {}", summary_.steps));
+  files_.log.note(fmt::format("checkpoint after step {}", files_.summary.steps));
 }
 
-void Run::restart() {
+void TimeLoop::restart() {
   points_.load(resumed_.states);
   solver_.load(resumed_.arrays);
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
-  dt_ = resumed_.dt;
-  summary_.steps = resumed_.step;
-  summary_.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
-  summary_.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
-  log_.start_from(resumed_.time / case_.control.end_time);
-  log_.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
+  size_.set_size(resumed_.dt);
+  files_.summary.steps = resumed_.step;
+  files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
+  files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
+  files_.log.start_from(resumed_.time / case_.control.end_time);
+  files_.log.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
   resumed_ = {};
-}
-
-void Run::finish(int status, const std::string& message) {
-  summary_.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
-  summary_.message = message;
-  summary_.exit_status = status;
-  summary_.wall_seconds = wall();
-  summary_.peak_memory_master = peak_memory();
-  options_.complete(summary_);
-  write_summary(options_.folder / "summary.json", summary_);
-  log_.say(fmt::format("{}: {}", summary_.status, message));
 }
 
 }  // namespace
 
 int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options) {
-  return Run(problem, points, options).go();
+  prepare_output_folder(options.folder, options.existing);
+  Checkpoint resumed;
+  if (options.existing == Existing::resume)
+    resumed = read_checkpoint(options.folder / "checkpoint.h5", case_hash(problem.parameters()), options.versions);
+  return TimeLoop(problem, points, options, std::move(resumed)).go();
 }
 
 }  // namespace femxdem

@@ -1,0 +1,39 @@
+#include "run_files.hpp"
+
+#include <fmt/format.h>
+
+namespace femxdem {
+
+RunFiles::RunFiles(const Case& c, const RunOptions& options)
+    : log(options.folder / "log.txt", options.existing), options_(options) {
+  replace_file(options.folder / "case.toml", effective_toml(c));
+  summary.ranks = options.ranks;
+  summary.case_hash = case_hash(c);
+  summary.command_line = options.command_line;
+  summary.versions = options.versions;
+}
+
+void RunFiles::begin_history(const std::vector<std::string>& columns, int last_step) {
+  history_.emplace(options_.folder / "history.csv", columns, options_.existing, last_step);
+}
+
+void RunFiles::add(const StepRecord& record) {
+  history_->add(record);
+  summary.evaluations += record.evaluations;
+  summary.dem_steps += record.dem_steps;
+  summary.engine_seconds += record.dem_seconds;
+}
+
+int RunFiles::finish(int status, const std::string& message) {
+  summary.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
+  summary.message = message;
+  summary.exit_status = status;
+  summary.wall_seconds = wall();
+  summary.peak_memory_master = peak_memory();
+  options_.complete(summary);
+  write_summary(options_.folder / "summary.json", summary);
+  log.say(fmt::format("{}: {}", summary.status, message));
+  return status;
+}
+
+}  // namespace femxdem

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "case.hpp"
+#include "errors.hpp"
+#include "history.hpp"
+#include "log.hpp"
+#include "output_folder.hpp"
+#include "summary.hpp"
+
+namespace femxdem {
+
+/// Where and how a case is run.
+struct RunOptions {
+  std::filesystem::path folder;
+  Existing existing = Existing::refuse;  ///< resume: go on from checkpoint.h5 of the folder
+  int ranks = 1;
+  std::string command_line;
+  std::map<std::string, std::string> versions;
+  std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
+};
+
+/// What every run of steps writes, a boundary value problem or the path of one point: log.txt, case.toml (the effective
+/// case), history.csv and, at the end, summary.json.
+class RunFiles {
+ public:
+  /// The folder is ready (prepare_output_folder). options is kept by reference.
+  RunFiles(const Case& c, const RunOptions& options);
+
+  /// history.csv with these columns of its own; rows after last_step of an earlier run are removed.
+  void begin_history(const std::vector<std::string>& columns, int last_step = 0);
+  /// A converged step, or the state before the first: its row and its share of the sums.
+  void add(const StepRecord& record);
+  /// Writes the summary and says the message. Returns the status.
+  int finish(int status, const std::string& message);
+  /// Wall time since the start [s].
+  double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  Log log;
+  Summary summary;
+
+ private:
+  const RunOptions& options_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::optional<History> history_;
+};
+
+}  // namespace femxdem
