@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <stdexcept>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "errors.hpp"
-#include "tensor.hpp"
 
 namespace femxdem {
 namespace {
@@ -16,42 +13,7 @@ using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
 
-/// exp(A) - I by its series, without the cancellation that exp(A) - I suffers for small A; |A| of order 1 at most.
-Tensor2 expm1(const Tensor2& A) {
-  Tensor2 sum = A, term = A;
-  for (int k = 2; term.norm() > 1e-18 * sum.norm() && k < 60; ++k) {
-    term = term * A / k;
-    sum += term;
-  }
-  return sum;
-}
-
-/// In which class of strain and of pressure a cell is; where it leaves it, its contact network may be another.
-std::array<int, 2> network_level(const Slot& slot) {
-  const Tensor2 F = tensor(slot.stretch);
-  const double strain = 0.5 * Tensor2((F.transpose() * F).log()).norm();
-  const double pressure = -tensor(slot.stress).trace() / 3;
-  const double level = pressure > 0 ? std::floor(std::log2(pressure)) : -1e3;
-  return {static_cast<int>(strain / 0.02), static_cast<int>(level)};
-}
-
-std::string unstrained(const Tensor2& F) {
-  return fmt::format(
-      "deformation gradient [{:.4g} {:.4g} {:.4g}; {:.4g} {:.4g} {:.4g}; {:.4g} {:.4g} {:.4g}] is not "
-      "admissible (det F = {:.4g})",
-      F(0, 0), F(0, 1), F(0, 2), F(1, 0), F(1, 1), F(1, 2), F(2, 0), F(2, 1), F(2, 2), F.determinant());
-}
-
-constexpr const char* kSmallerStep = "Try a smaller load step.";
-
 }  // namespace
-
-/// What the volume element is asked to do.
-struct PythonVolumeElements::Plan {
-  Tensor2 R = Tensor2::Identity();
-  Tensor2 U = Tensor2::Identity();
-  std::optional<Failure> refusal;
-};
 
 PythonVolumeElements::PythonVolumeElements(WorkerProcess& worker, VolumeElementOptions options)
     : worker_(worker), options_(std::move(options)) {}
@@ -75,32 +37,34 @@ std::string PythonVolumeElements::versions() {
 void PythonVolumeElements::add(const std::string& state, std::size_t count) {
   if (count == 0) return;
   drop_trial();
-  worker_.request(Command::add, static_cast<std::int64_t>(count), 0, state);
+  const std::optional<VeState> saved = decode(state);
+  worker_.request(Command::add, static_cast<std::int64_t>(count), 0, saved ? saved->bytes : state);
   const std::size_t first = size();
   const VeInfo added = worker_.slot(first).info;
-  if (!(added.time_scale > 0 && std::isfinite(added.time_scale) && added.time_step > 0))
-    throw UserError(
-        fmt::format("volume element: mean stress {:.3g} Pa, time step {:.3g} s: without pressure the inertial "
-                    "number sets no rate; start from a state under compression",
-                    added.mean_stress, added.time_step));
-  committed_stretch_.resize(first + count);
-  committed_level_.resize(first + count);
-  reference_time_scale_.resize(first + count, added.time_scale);
-  frozen_steps_.resize(first + count, 0);
+  if (!saved) require_time_scale(added.time_scale, added.time_step, added.mean_stress);
+  StrainedPoint point;
+  point.reference_time_scale = saved ? saved->reference_time_scale : added.time_scale;
+  points_.resize(first + count, point);
   for (std::size_t i = first; i < size(); ++i) adopt_state(i);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
 }
 
-void PythonVolumeElements::begin_step() { std::fill(frozen_steps_.begin(), frozen_steps_.end(), 0); }
+void PythonVolumeElements::remove(std::size_t index) {
+  drop_trial();
+  worker_.request(Command::remove, static_cast<std::int64_t>(index));
+  points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(index));
+}
+
+void PythonVolumeElements::begin_step() {
+  for (StrainedPoint& point : points_) point.frozen_steps = 0;
+}
 
 std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
-  if (wanted == Operator::tangent)
-    throw UserError("volume elements have no tangent in closed form; choose the elastic or the quasi-Newton operator");
-  if (F.size() != size()) throw std::invalid_argument("evaluate: one deformation gradient per volume element");
+  require_answerable(wanted, F.size(), size());
   drop_trial();
   std::vector<Response> responses(size());
   if (size() == 0) return responses;
-  std::vector<Plan> plans;
+  std::vector<Straining> plans;
   for (std::size_t i = 0; i < size(); ++i) {
     plans.push_back(plan(i, F[i]));
     worker_.slot(i).task = plans[i].refusal ? Task::skip : Task::deform;
@@ -113,35 +77,12 @@ std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F,
   return responses;
 }
 
-PythonVolumeElements::Plan PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {
-  Plan plan;
-  if (!F.allFinite() || F.determinant() <= 0) {
-    plan.refusal = Failure{index, unstrained(F), kSmallerStep};
-    return plan;
-  }
-  const PolarDecomposition polar = polar_decomposition(F);
-  plan.R = polar.R;
-  plan.U = polar.U;
+Straining PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {
   Slot& slot = worker_.slot(index);
-  // ln of U U_n^-1, which is similar to a symmetric positive definite tensor: its eigenvalues are real and positive
-  const Tensor2 increment = (plan.U * committed_stretch_[index].inverse()).log();
-  const double size = increment.norm();
-  if (!(size <= options_.max_increment)) {
-    plan.refusal =
-        Failure{index, fmt::format("strain increment {:.3g} in one trial, limit {:.3g}", size, options_.max_increment),
-                kSmallerStep};
-    return plan;
-  }
-  slot.steps = 0;
-  if (size < 1e-14) return plan;
-  const double rate = options_.inertial_number / reference_time_scale_[index];
-  const long needed = std::max<long>(options_.min_steps, std::lround(std::ceil(size / (rate * slot.info.time_step))));
-  long& steps = frozen_steps_[index];
-  if (!options_.freeze_steps || steps == 0 || needed > 2 * steps) steps = needed;
-  slot.steps = steps;
-  const RowMajor2 L = expm1(increment / static_cast<double>(steps)) / slot.info.time_step;
-  std::copy_n(L.data(), 9, slot.velocity_gradient.begin());
-  return plan;
+  const Straining straining = plan_straining(options_, points_[index], slot.info.time_step, index, F);
+  slot.steps = straining.steps;
+  slot.velocity_gradient = straining.velocity_gradient;
+  return straining;
 }
 
 void PythonVolumeElements::run_trial(bool with_stiffness, std::vector<Response>& responses) {
@@ -173,29 +114,16 @@ void PythonVolumeElements::fail_after_deaths(std::vector<Response>& responses, s
   responses[*index].failure = Failure{*index, fmt::format("its trial ended twice with {}", cause), kSmallerStep};
 }
 
-void PythonVolumeElements::read(std::size_t index, const Plan& plan, Operator wanted, Response& response) {
+void PythonVolumeElements::read(std::size_t index, const Straining& straining, Operator wanted, Response& response) {
   const Slot& slot = worker_.slot(index);
   std::copy(slot.report.begin(), slot.report.end(), response.report.values.begin());
-  const auto fail = [&](std::string sentence, std::string advice) {
-    response.failure = Failure{index, std::move(sentence), std::move(advice)};
-  };
-  if (slot.outcome != Outcome::answered) return fail(slot.sentence.data(), kSmallerStep);
-  const double miss = (tensor(slot.stretch) - plan.U).norm() / plan.U.norm();
-  if (!(miss <= 1e-9))
-    return fail(fmt::format("its cell missed the stretch by {:.2e} (relative), limit 1e-09", miss), kSmallerStep);
-  if (response.report["contacts"] == 0)
-    return fail("it has lost all its contacts: no stress, no unbalanced force",
-                "It can carry no tension: keep it under pressure, give it ve.cohesion, or try a smaller load step.");
-  const double unbalanced = response.report["unbalanced_force"];
-  if (!(unbalanced <= options_.max_unbalanced_force))
-    return fail(fmt::format("unbalanced force {:.1e} after {} steps, limit {:.1e}", unbalanced, slot.steps,
-                            options_.max_unbalanced_force),
-                fmt::format("Lower ve.inertial_number (now {:g}) or ve.time_step_safety.", options_.inertial_number));
-  const Tensor2 stress = tensor(slot.stress);
-  if (!stress.allFinite()) return fail("its stress is not a number", kSmallerStep);
-  response.stress = rotate(stress, plan.R);
-  if (wanted == Operator::elastic)
-    response.stiffness = rotate(Tensor4(Eigen::Map<const Tensor4>(slot.stiffness.data())), plan.R);
+  if (slot.outcome != Outcome::answered) {
+    response.failure = Failure{index, slot.sentence.data(), kSmallerStep};
+    return;
+  }
+  Strained found{tensor(slot.stress), tensor(slot.stretch), {}};
+  if (wanted == Operator::elastic) found.stiffness = Eigen::Map<const Tensor4>(slot.stiffness.data());
+  judge(options_, straining, index, found, response);
 }
 
 void PythonVolumeElements::commit() {
@@ -205,7 +133,7 @@ void PythonVolumeElements::commit() {
   peak_memory_ = std::max(peak_memory_, worker_.memory());
   const auto request = [&] {
     for (std::size_t i = 0; i < size(); ++i)
-      worker_.slot(i).task = network_level(worker_.slot(i)) == committed_level_[i] ? Task::skip : Task::follow_network;
+      worker_.slot(i).task = level(i) == points_[i].level ? Task::skip : Task::follow_network;
     return worker_.request(Command::commit);
   };
   Reply reply;
@@ -223,12 +151,18 @@ void PythonVolumeElements::commit() {
   begin_step();
 }
 
+/// The state of a volume element, which goes on from it.
+std::string PythonVolumeElements::save_one(std::size_t index) {
+  std::string bytes = worker_.mail(worker_.request(Command::save, static_cast<std::int64_t>(index)));
+  adopt_state(index);
+  return encode({EngineKind::yade, points_[index].reference_time_scale, std::move(bytes)});
+}
+
 SavedStates PythonVolumeElements::save() {
   drop_trial();
   SavedStates states;
   for (std::size_t i = 0; i < size(); ++i) {
-    states.push_back(worker_.mail(worker_.request(Command::save, static_cast<std::int64_t>(i))));
-    adopt_state(i);
+    states.push_back(save_one(i));
   }
   begin_step();
   return states;
@@ -239,7 +173,10 @@ void PythonVolumeElements::load(const SavedStates& states) {
     throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
   drop_trial();
   for (std::size_t i = 0; i < size(); ++i) {
-    worker_.request(Command::load, static_cast<std::int64_t>(i), 0, states[i]);
+    const VeState state =
+        decode(states[i]).value_or(VeState{EngineKind::yade, points_[i].reference_time_scale, states[i]});
+    worker_.request(Command::load, static_cast<std::int64_t>(i), 0, state.bytes);
+    points_[i].reference_time_scale = state.reference_time_scale;
     adopt_state(i);
   }
   begin_step();
@@ -250,9 +187,14 @@ void PythonVolumeElements::drop_trial() {
   trial_pending_ = false;
 }
 
+NetworkLevel PythonVolumeElements::level(std::size_t index) {
+  const Slot& slot = worker_.slot(index);
+  return network_level(tensor(slot.stretch), tensor(slot.stress));
+}
+
 void PythonVolumeElements::adopt_state(std::size_t index) {
-  committed_stretch_[index] = tensor(worker_.slot(index).stretch);
-  committed_level_[index] = network_level(worker_.slot(index));
+  points_[index].stretch = tensor(worker_.slot(index).stretch);
+  points_[index].level = level(index);
 }
 
 }  // namespace femxdem

@@ -152,6 +152,29 @@ inline void check_bad_gradients(MaterialPoints& points, const Tolerances& tolera
   }
 }
 
+/// A copy, made after the point has gone a way on which its time scale may have changed, answers as its original: the
+/// same stress to the bit, in as many DEM steps.
+inline void check_copies(LocalPoints& points, const Tolerances& tolerances) {
+  SCOPED_TRACE("a copy answers as its original");
+  const std::size_t count = points.size();
+  const auto F = gradients(count, 4 * tolerances.strain);
+  trial(points, part(F, 0.5));
+  points.commit();
+  for (std::size_t k = 0; k < count; ++k) points.copy(k);
+  ASSERT_EQ(points.size(), 2 * count);
+  auto twice = F;
+  twice.insert(twice.end(), F.begin(), F.end());
+  const auto answers = trial(points, twice);
+  const std::vector<Response> originals(answers.begin(), answers.begin() + static_cast<std::ptrdiff_t>(count));
+  const std::vector<Response> copies(answers.begin() + static_cast<std::ptrdiff_t>(count), answers.end());
+  expect_same_bits(originals, copies);
+  for (std::size_t k = 0; k < count; ++k)
+    EXPECT_EQ(originals[k].report["dem_steps"], copies[k].report["dem_steps"]) << "point " << k;
+  for (std::size_t k = 0; k < count; ++k) points.remove(0);
+  ASSERT_EQ(points.size(), count);
+  expect_same_bits(trial(points, F), copies);
+}
+
 /// All of it, each part from the state in which the points come. At least three points.
 inline void check(MaterialPoints& points, const Tolerances& tolerances) {
   ASSERT_GE(points.size(), 3U);
@@ -161,6 +184,14 @@ inline void check(MaterialPoints& points, const Tolerances& tolerances) {
     points.load(start);
     part_of_contract(points, tolerances);
   }
+  points.load(start);
+}
+
+/// The same for the points of one rank.
+inline void check_local(LocalPoints& points, const Tolerances& tolerances) {
+  check(points, tolerances);
+  const SavedStates start = points.save();
+  check_copies(points, tolerances);
   points.load(start);
 }
 

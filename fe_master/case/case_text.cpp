@@ -1,12 +1,11 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "case.hpp"
 #include "case_parameters.hpp"
+#include "hash.hpp"
+#include "output_folder.hpp"
 
 namespace femxdem {
 
@@ -101,23 +100,10 @@ void describe(std::string& out, const Section<S>& section, bool array) {
   out += "\n";
 }
 
-std::string contents(const std::string& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return file.empty() ? "" : text.str();
-}
-
-/// FNV-1a (Fowler, Noll, Vo 1991), 64 bits.
-std::string hash(const std::string& text) {
-  std::uint64_t h = 14695981039346656037ull;
-  for (const char character : text) h = (h ^ static_cast<unsigned char>(character)) * 1099511628211ull;
-  return fmt::format("{:016x}", h);
-}
-
 /// The packing's files by their contents, where they are cached not at all.
 void forget_places(VeParameters& ve) {
-  ve.script = hash(contents(ve.script));
-  ve.scene = hash(contents(ve.scene));
+  ve.script = hash_text(read_file(ve.script));
+  ve.scene = hash_text(read_file(ve.scene));
   ve.cache.clear();
 }
 
@@ -176,10 +162,10 @@ std::string describe_parameters() {
 std::string case_hash(const Case& c) {
   Case placeless = c;
   placeless.output = {};
-  placeless.mesh.file = hash(contents(c.mesh.file));
+  placeless.mesh.file = hash_text(read_file(c.mesh.file));
   forget_places(placeless.ve);
   for (RegionVe& region : placeless.ve_regions) forget_places(region.ve);
-  return hash(effective_toml(placeless));
+  return hash_text(effective_toml(placeless));
 }
 
 std::string ve_spec_json(const VeParameters& ve) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -42,6 +43,12 @@ void prepare_output_folder(const fs::path& folder, Existing existing) {
                     "choose another --out",
                     folder.string()));
   }
+}
+
+std::string read_file(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
 }
 
 void replace_file(const fs::path& file, std::string_view text) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace femxdem {
@@ -15,6 +16,9 @@ enum class Existing {
 /// Makes the folder where it is missing, and its parents. Throws UserError where it cannot be made or written, and
 /// where it holds results and `existing` refuses them.
 void prepare_output_folder(const std::filesystem::path& folder, Existing existing);
+
+/// The bytes of a file; empty where there is none.
+std::string read_file(const std::filesystem::path& file);
 
 /// Writes beside `file` and renames: a reader sees the old text or the new one, never half of it.
 void replace_file(const std::filesystem::path& file, std::string_view text);

@@ -96,8 +96,16 @@ class MaterialPoints {
 /// The material points that one rank serves; the bridge's volume elements, or a law in closed form in tests.
 class LocalPoints : public MaterialPoints {
  public:
-  /// `count` more points, each in this state, at the end of the batch.
+  /// `count` more points, each in this state, at the end of the batch: one that save() gave, which answers as its
+  /// original does, to the bit, or one as it was made.
   virtual void add(const std::string& state, std::size_t count) = 0;
+  /// One more point in the committed state of this one, at the end of the batch. The original goes on from exactly what
+  /// was copied.
+  void copy(std::size_t point) { add(save_one(point), 1); }
+  /// Takes a point away; those behind it move up by one.
+  virtual void remove(std::size_t point) = 0;
+  /// The committed state of one point, see save().
+  virtual std::string save_one(std::size_t point) = 0;
   /// Largest memory so far of what stands behind the points [byte].
   virtual std::uint64_t peak_memory() const = 0;
 };

@@ -4,29 +4,15 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <regex>
-#include <sstream>
 
+#include "hash.hpp"
 #include "output_folder.hpp"
 
 namespace femxdem {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// FNV-1a hash, 64 bits: names a file of the cache.
-std::string hash(std::string_view text) {
-  std::uint64_t h = 14695981039346656037ull;
-  for (const unsigned char c : text) h = (h ^ c) * 1099511628211ull;
-  return fmt::format("{:016x}", h);
-}
-
-std::string read_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 /// What the prepared state depends on: the specification, the files that it names, the versions and scripts that make
 /// it.
@@ -38,7 +24,7 @@ std::string key_of(const VeParameters& ve, const std::string& specification, con
   for (const char* maker : {"packing.py", "contact_laws.py", "adoption.py", "time_step.py"}) {
     key += read_file(fs::path(FEMXDEM_YADE_SCRIPTS) / maker);
   }
-  return hash(key);
+  return hash_text(key);
 }
 
 std::map<std::string, std::string> parse_strings(const std::string& json) {

@@ -45,12 +45,12 @@ VolumeElementOptions serialised() {
 
 TEST(PythonVolumeElements, ContractWithFork) {
   Points three(kThree);
-  contract::check(three.points, {});
+  contract::check_local(three.points, {});
 }
 
 TEST(PythonVolumeElements, ContractWithSerialising) {
   Points three(kThree, dummy(), serialised());
-  contract::check(three.points, {});
+  contract::check_local(three.points, {});
 }
 
 TEST(PythonVolumeElements, ForkAndSerialisingGiveTheSameBits) {
@@ -73,7 +73,7 @@ TEST(PythonVolumeElements, WhereForkIsRefusedItSerialisesAndSaysSoOnce) {
   PythonVolumeElements unforkable(worker, options);
   EXPECT_THROW(unforkable.make_template(kPlain), UserError);
   unforkable.add(forked.points.save()[0], 3);
-  contract::check(unforkable, {});
+  contract::check_local(unforkable, {});
   const auto F = gradients(3, 1e-3);
   expect_same_bits(contract::trial(unforkable, F), contract::trial(forked.points, F));
   ASSERT_EQ(said.size(), 1U);

@@ -84,9 +84,13 @@ Response PathLengthPoints::respond(std::size_t index, const Tensor2& F, Operator
   return response;
 }
 
+std::string PathLengthPoints::save_one(std::size_t index) {
+  return {reinterpret_cast<const char*>(&committed_[index]), sizeof(State)};
+}
+
 SavedStates PathLengthPoints::save() {
   SavedStates states;
-  for (const State& state : committed_) states.emplace_back(reinterpret_cast<const char*>(&state), sizeof state);
+  for (std::size_t i = 0; i < size(); ++i) states.push_back(save_one(i));
   return states;
 }
 

@@ -13,6 +13,8 @@ namespace femxdem {
 class PathLengthPoints : public LocalPoints {
  public:
   void add(const std::string& state, std::size_t count) override;
+  void remove(std::size_t index) override { committed_.erase(committed_.begin() + static_cast<std::ptrdiff_t>(index)); }
+  std::string save_one(std::size_t index) override;
   std::uint64_t peak_memory() const override { return 1000 + size(); }
   std::size_t size() const override { return committed_.size(); }
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "material_points.hpp"
+
+namespace femxdem {
+
+/// How the volume elements of a rank are strained and judged.
+struct VolumeElementOptions {
+  double inertial_number = 5e-3;      ///< I = rate a sqrt(rho / p) of a trial [-]
+  int min_steps = 10;                 ///< least DEM steps of a trial that strains
+  bool freeze_steps = true;           ///< a load step's trials take as many DEM steps as its first
+  double max_unbalanced_force = 0.2;  ///< an answer above is refused [-]
+  double max_increment = 0.2;         ///< largest |ln U_inc| of one trial [-]
+  bool relaxed = false;               ///< the elastic stiffness is the relaxed one, not Eq. (2)
+  bool serialise = false;             ///< YADE's volume elements are saved and restored at every trial, not forked
+  /// Where remarks go: a trial that was repeated, a fork that was refused.
+  std::function<void(std::string_view)> say = [](std::string_view) {};
+};
+
+/// In which class of strain and of pressure a cell is; where it leaves it, its contact network may be another.
+using NetworkLevel = std::array<int, 2>;
+NetworkLevel network_level(const Tensor2& stretch, const Tensor2& stress);
+
+/// What the straining of one volume element needs to know of it, whichever engine holds it.
+struct StrainedPoint {
+  Tensor2 stretch = Tensor2::Identity();  ///< committed deformation gradient of the cell
+  NetworkLevel level{};                   ///< committed
+  double reference_time_scale = 0;        ///< a sqrt(rho / p) of the state that the case starts from [s]
+  long frozen_steps = 0;                  ///< of this load step's trials; 0: to be chosen at the next one
+};
+
+/// What a volume element is asked to do: hold velocity_gradient for `steps` DEM steps.
+struct Straining {
+  Tensor2 R = Tensor2::Identity();
+  Tensor2 U = Tensor2::Identity();
+  std::array<double, 9> velocity_gradient{};  ///< row-major [1/s]
+  long steps = 0;
+  std::optional<Failure> refusal;
+};
+
+/// F is followed up to this: points whose histories differ by round-off alone then ask for the same to the bit.
+inline constexpr double kQuantum = 1.0 / (1LL << 40);
+Tensor2 quantised(const Tensor2& F);
+
+/// The straining that takes volume element `index` from its committed stretch to F = R U along the stretch only:
+/// L = (U_inc^(1/n) - I) / dt, U_inc = U U_n^-1. The number of steps n = max(min_steps, |ln U_inc| / (rate dt)), rate =
+/// I / reference time scale, is frozen from the first trial of a load step on (unless a later one would need more than
+/// twice as many), so that the response is a smooth function of F. time_step: of the DEM [s].
+Straining plan_straining(const VolumeElementOptions& options, StrainedPoint& point, double time_step, std::size_t index,
+                         const Tensor2& F);
+
+/// What an engine has found at the end of a straining, in the frame of the stretch.
+struct Strained {
+  Tensor2 stress;                    ///< Cauchy, symmetric [Pa]
+  Tensor2 stretch;                   ///< deformation gradient of the cell
+  std::optional<Tensor4> stiffness;  ///< [Pa], when asked for
+};
+
+/// Fills stress and stiffness of a response (its report is there already) or its failure: a cell that missed its
+/// stretch, has lost its contacts, is out of balance or whose stress is no number is not an answer.
+void judge(const VolumeElementOptions& options, const Straining& straining, std::size_t index, const Strained& found,
+           Response& response);
+
+/// Throws UserError for a state without pressure: the inertial number sets no rate without a time scale.
+void require_time_scale(double time_scale, double time_step, double mean_stress);
+/// Throws UserError for a stiffness that no volume element has, std::invalid_argument for another number of points.
+void require_answerable(Operator wanted, std::size_t gradients, std::size_t points);
+
+inline constexpr const char* kSmallerStep = "Try a smaller load step.";
+
+}  // namespace femxdem

@@ -1,0 +1,56 @@
+#include "ve_state.hpp"
+
+#include <fmt/format.h>
+
+#include "errors.hpp"
+#include "hash.hpp"
+#include "packet.hpp"
+
+namespace femxdem {
+namespace {
+
+constexpr std::string_view kMark = "femxdem-ve-state";
+constexpr std::uint32_t kVersion = 1;
+
+}  // namespace
+
+std::string encode(const VeState& state) {
+  PacketWriter packet;
+  packet.put(kVersion);
+  packet.put(static_cast<std::int32_t>(state.engine));
+  packet.put(state.reference_time_scale);
+  packet.put(std::string_view(state.bytes));
+  const std::string content = packet.take();
+  PacketWriter checked;
+  checked.put(hash(content));
+  return std::string(kMark) + checked.take() + content;
+}
+
+std::optional<VeState> decode(std::string_view bytes) {
+  if (!bytes.starts_with(kMark)) return std::nullopt;
+  const auto damaged = [] {
+    return UserError("saved volume element: its bytes are damaged or cut off; go back to an older checkpoint");
+  };
+  try {
+    PacketReader checked(bytes.substr(kMark.size()));
+    const auto expected = checked.get<std::uint64_t>();
+    const std::string_view content = bytes.substr(kMark.size() + sizeof expected);
+    if (hash(content) != expected) throw damaged();
+    PacketReader packet(content);
+    const auto version = packet.get<std::uint32_t>();
+    if (version != kVersion)
+      throw UserError(
+          fmt::format("saved volume element: version {} of the format, this program reads {}; use the "
+                      "program that wrote it",
+                      version, kVersion));
+    VeState state;
+    state.engine = static_cast<EngineKind>(packet.get<std::int32_t>());
+    state.reference_time_scale = packet.get<double>();
+    state.bytes = packet.get_text();
+    return state;
+  } catch (const std::out_of_range&) {
+    throw damaged();
+  }
+}
+
+}  // namespace femxdem

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace femxdem {
+
+/// Which engine a state belongs to.
+enum class EngineKind : std::int32_t { yade, compact };
+
+/// A volume element's committed state as it travels, to a checkpoint or to another rank: with it goes whatever decides
+/// its next answer.
+struct VeState {
+  EngineKind engine = EngineKind::yade;
+  double reference_time_scale = 0;  ///< see StrainedPoint [s]
+  std::string bytes;                ///< the engine's own
+};
+
+/// Bytes with a mark, a version and a checksum.
+std::string encode(const VeState& state);
+/// Nothing where the bytes have not the mark: an engine's own state, of a volume element as it was made. Throws
+/// UserError for bytes that are damaged or of another version.
+std::optional<VeState> decode(std::string_view bytes);
+
+}  // namespace femxdem
