@@ -37,6 +37,11 @@ std::string mistakes_of(const std::string& file, const std::vector<std::string>&
 
 const fs::path kCases = fs::path(TEST_CASES).lexically_normal();
 
+const std::map<std::string, BadCase>& bad_cases() {
+  static const std::map<std::string, BadCase> cases = read_bad_cases(kCases / "bad.txt");
+  return cases;
+}
+
 class RefusedCase : public testing::TestWithParam<std::string> {
  protected:
   /// Every bad case as a file in a folder of its own, beside what it names.
@@ -44,7 +49,7 @@ class RefusedCase : public testing::TestWithParam<std::string> {
     fs::create_directories(folder() / "bad");
     fs::copy_file(kCases / "triangles.geo", folder() / "triangles.geo");
     const std::vector<std::string> base = lines_of(kCases / "bad_base.toml");
-    for (const auto& [name, bad] : read_bad_cases(kCases / "bad.txt")) std::ofstream(file(name)) << changed(base, bad);
+    for (const auto& [name, bad] : bad_cases()) std::ofstream(file(name)) << changed(base, bad);
   }
   static void TearDownTestSuite() { fs::remove_all(folder()); }
   static fs::path folder() {
@@ -55,7 +60,7 @@ class RefusedCase : public testing::TestWithParam<std::string> {
   /// The sentences as read_case writes them.
   static std::string expected(const std::string& name) {
     std::string text;
-    for (const std::string& sentence : read_bad_cases(kCases / "bad.txt").at(name).expected)
+    for (const std::string& sentence : bad_cases().at(name).expected)
       text += (text.empty() ? "FILE:" : "\nFILE:") + sentence;
     return replaced(replaced(text, "FILE", file(name)), "DIR", folder().string());
   }
@@ -63,7 +68,7 @@ class RefusedCase : public testing::TestWithParam<std::string> {
 
 std::vector<std::string> names_of_bad_cases() {
   std::vector<std::string> names;
-  for (const auto& entry : read_bad_cases(kCases / "bad.txt")) names.push_back(entry.first);
+  for (const auto& entry : bad_cases()) names.push_back(entry.first);
   return names;
 }
 
