@@ -118,7 +118,8 @@ class Campaign:
 
         def start(said):
             if not goes_on:
-                (folder / "history.csv").unlink(missing_ok=True)  # bad input leaves no new one
+                for left in ("history.csv", "checkpoint.h5"):  # bad input leaves no new ones
+                    (folder / left).unlink(missing_ok=True)
             command = self.command(words, case, name, settings, ranks, "--restart" if goes_on else "--overwrite")
             return subprocess.run(command, stdout=said, stderr=said, env=ENVIRONMENT, cwd=self.home).returncode
 
