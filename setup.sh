@@ -103,7 +103,7 @@ demo() {
   say "the single volume element on the same path"
   "$BUILD/femxdem" ve path validation/biaxial/demo_ve.toml --out out/demo_ve --overwrite
   say "figures"
-  "$PYTHON" validation/plot.py out/demo --ve out/demo_ve
+  "$PYTHON" fe_master/program/plot.py out/demo --ve out/demo_ve
   cat <<'TEXT'
 out/demo/curve.png        axial stress over axial strain: the specimen over its single volume element
 out/demo/maps_*.png       where the strain has gone: second invariant, volume change, porosity, cost

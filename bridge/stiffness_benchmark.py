@@ -35,12 +35,13 @@ def main():
     parser.add_argument("--repetitions", type=int, default=41)
     parser.add_argument("--build", type=Path, default=ROOT / "build/release")
     a = parser.parse_args()
-    sys.path[:0] = [str(ROOT / "yade_scripts"), str(a.build.resolve())]
+    sys.path[:0] = [str(ROOT / "yade_scripts"), str(ROOT / "tests" / "yade"), str(a.build.resolve())]
+    from cells import packing
     from contact_laws import note_constant_stiffness
     from volume_element import Engine
 
     engine = Engine(["dem_steps"])
-    spec = {"source": "prepare", "spheres": a.spheres, "contact_law": a.law, "cohesion": 0.0 if a.law == "friction" else 1.0}
+    spec = packing(spheres=a.spheres, contact_law=a.law, cohesion=0.0 if a.law == "friction" else 1.0)
     ve = engine.add(engine.make_template(spec)["state"])
     C = np.zeros(81)
     noted = milliseconds(lambda: engine.stiffness(ve, C), a.repetitions)

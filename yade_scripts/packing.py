@@ -6,22 +6,6 @@ import numpy as np
 
 import contact_laws
 
-DEFAULTS = {
-    "spheres": 100,
-    "size_ratio": 1.5,  # d_max/d_min, diameters uniform between them
-    "kappa": 500.0,  # kn/(sigma_0 a)
-    "stiffness_ratio": 1.0,  # kn/kt
-    "friction": 0.5,
-    "compaction_friction": 0.0,  # friction while the packing is made: 0 is the densest
-    "cohesion": 0.0,  # p* = f_c/(sigma_0 a^2)
-    "contact_law": "adhesive",
-    "new_contacts": "frictional",  # contacts that form after the preparation
-    "confining_stress": 1e5,  # sigma_0 [Pa]
-    "mean_diameter": 1e-3,  # a [m]
-    "density": 2600.0,  # of the grains [kg/m^3]
-    "damping": 0.2,  # YADE's non-viscous damping, while the VE is strained
-    "seed": 1,
-}
 COMPACTION_DAMPING = 0.3
 STRESS_TOLERANCE = 5e-4  # of sigma_0, each component
 UNBALANCED_TOLERANCE = 5e-5
@@ -31,13 +15,14 @@ MAX_STEPS = 400_000
 
 
 def prepare(O, spec):
-    """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest.
+    """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest. `spec` is the whole [ve]
+    table of a case: `femxdem parameters` has its units, and the only defaults.
 
     Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii
     are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
     Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
     """
-    p = _checked({**DEFAULTS, **spec})
+    p = _checked(spec)
     rng = np.random.default_rng(p["seed"])
     sigma, a, law = p["confining_stress"], p["mean_diameter"], p["contact_law"]
     kn, f_c = p["kappa"] * sigma * a, p["cohesion"] * sigma * a * a

@@ -17,7 +17,7 @@ import user_scenes
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}
+DEFAULTS = {"arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}  # of a user's script; no case sets the last two
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 

@@ -10,11 +10,16 @@ using contract::expect_same_bits;
 using contract::gradients;
 using contract::part;
 
+constexpr const char* kSpecification = R"({"source": "prepare", "spheres": 64, "seed": 3, "size_ratio": 1.5,
+  "kappa": 500.0, "stiffness_ratio": 1.0, "friction": 0.5, "compaction_friction": 0.0, "cohesion": 0.0,
+  "contact_law": "adhesive", "new_contacts": "frictional", "confining_stress": 1e5, "mean_diameter": 1e-3,
+  "density": 2600.0, "damping": 0.2, "time_step_safety": 0.8})";
+
 /// Packing of 64 spheres, prepared once for all tests.
 const std::string& packing() {
   static const std::string state = [] {
     WorkerProcess worker({});
-    return PythonVolumeElements(worker, {}).make_template(R"({"source": "prepare", "spheres": 64, "seed": 3})").state;
+    return PythonVolumeElements(worker, {}).make_template(kSpecification).state;
   }();
   return state;
 }

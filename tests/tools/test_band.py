@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "validation"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "fe_master" / "program"))
 from band import axes_of, band_of_run, measure_band
 from results import ResultsError
 from sample_run import gauss_points, rectangle, write_run

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "validation"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "fe_master" / "program"))
 from plot import plot_run, quarters
 from results import (ResultsError, axial_curve, deformed_points, logarithmic_strain, natural_coordinates, path_curve, read_mesh, read_step,
                      shape_functions, strain_invariant)

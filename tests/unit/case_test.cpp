@@ -1,11 +1,13 @@
 #include "case.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <set>
 
+#include "bad_cases.hpp"
 #include "case_parameters.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
@@ -33,34 +35,52 @@ std::string mistakes_of(const std::string& file, const std::vector<std::string>&
   }
 }
 
-/// Lines "# expected LINE:COLUMN: sentence" of a case, as read_case writes them; DIR is tests/cases, FILE the case.
-std::string expected_of(const std::string& file) {
-  const std::string mark = "# expected ";
-  std::string expected;
-  std::ifstream stream(file);
-  for (std::string line; std::getline(stream, line);) {
-    if (line.rfind(mark, 0) == 0) expected += (expected.empty() ? "FILE:" : "\nFILE:") + line.substr(mark.size());
-  }
-  return replaced(replaced(expected, "FILE", file), "DIR", fs::path(TEST_CASES).lexically_normal().string());
+const fs::path kCases = fs::path(TEST_CASES).lexically_normal();
+
+const std::map<std::string, BadCase>& bad_cases() {
+  static const std::map<std::string, BadCase> cases = read_bad_cases(kCases / "bad.txt");
+  return cases;
 }
 
-std::vector<std::string> bad_cases() {
+class RefusedCase : public testing::TestWithParam<std::string> {
+ protected:
+  /// Every bad case as a file in a folder of its own, beside what it names.
+  static void SetUpTestSuite() {
+    fs::create_directories(folder() / "bad");
+    fs::copy_file(kCases / "triangles.geo", folder() / "triangles.geo");
+    const std::vector<std::string> base = lines_of(kCases / "bad_base.toml");
+    for (const auto& [name, bad] : bad_cases()) std::ofstream(file(name)) << changed(base, bad);
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder()); }
+  static fs::path folder() {
+    return (fs::path(testing::TempDir()) / ("refused_cases_" + std::to_string(getpid()))).lexically_normal();
+  }
+  static std::string file(const std::string& name) { return (folder() / "bad" / (name + ".toml")).string(); }
+
+  /// The sentences as read_case writes them.
+  static std::string expected(const std::string& name) {
+    std::string text;
+    for (const std::string& sentence : bad_cases().at(name).expected)
+      text += (text.empty() ? "FILE:" : "\nFILE:") + sentence;
+    return replaced(replaced(text, "FILE", file(name)), "DIR", folder().string());
+  }
+};
+
+std::vector<std::string> names_of_bad_cases() {
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(std::string(TEST_CASES) + "/bad"))
-    names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
+  for (const auto& entry : bad_cases()) names.push_back(entry.first);
   return names;
 }
 
-class BadCase : public testing::TestWithParam<std::string> {};
-
-TEST_P(BadCase, IsRefusedWithItsSentences) {
-  const std::string file = std::string(TEST_CASES) + "/bad/" + GetParam() + ".toml";
-  ASSERT_FALSE(expected_of(file).empty());
-  EXPECT_EQ(mistakes_of(file), expected_of(file));
+TEST_P(RefusedCase, HasItsSentences) {
+  ASSERT_FALSE(expected(GetParam()).empty());
+  EXPECT_EQ(mistakes_of(file(GetParam())), expected(GetParam()));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BadCase, testing::ValuesIn(bad_cases()), [](const auto& info) { return info.param; });
+INSTANTIATE_TEST_SUITE_P(All, RefusedCase, testing::ValuesIn(names_of_bad_cases()),
+                         [](const auto& info) { return info.param; });
+
+TEST(Case, TheBaseOfTheBadCasesIsGood) { EXPECT_EQ(mistakes_of((kCases / "bad_base.toml").string()), ""); }
 
 TEST(Case, GoodCaseIsRead) {
   const Case c = read_case(kGood);

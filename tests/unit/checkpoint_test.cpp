@@ -1,7 +1,6 @@
 #include "checkpoint.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <fstream>
@@ -9,20 +8,16 @@
 
 #include "errors.hpp"
 #include "hdf5_file.hpp"
+#include "own_folder.hpp"
 
 namespace femxdem {
 namespace {
 
 namespace fs = std::filesystem;
 
-class CheckpointTest : public testing::Test {
+class CheckpointTest : public OwnFolder {
  protected:
-  CheckpointTest()
-      : folder_(fs::temp_directory_path() / ("femxdem_checkpoint_" + std::to_string(getpid()) + "_" +
-                                             testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::create_directories(folder_);
-  }
-  ~CheckpointTest() override { fs::remove_all(folder_); }
+  CheckpointTest() { fs::create_directories(folder_); }
 
   std::string sentence(const std::string& hash, const std::map<std::string, std::string>& versions) const {
     try {
@@ -33,8 +28,6 @@ class CheckpointTest : public testing::Test {
     return "accepted";
   }
   fs::path file() const { return folder_ / "checkpoint.h5"; }
-
-  fs::path folder_;
 };
 
 Checkpoint sample() {

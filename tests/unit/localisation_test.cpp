@@ -56,16 +56,6 @@ TEST(Localisation, ElasticDeterminantIsThatOfTheWaves) {
   EXPECT_NEAR(min_acoustic_determinant(isotropic_stiffness(3, 2)), 7 * 2, 1e-12);  // (lambda + 2 G) G
 }
 
-/// The traction rate across a band from the tangent alone equals the one from the nominal stress.
-TEST(Localisation, GeometricTermsCancelInTheAcousticTensor) {
-  const Tensor2 stress = (Tensor2() << -3, 1, 0, 1, -7, 0, 0, 0, -4).finished();
-  const double angle = 0.7;
-  const Eigen::Vector3d n(-std::sin(angle), std::cos(angle), 0);
-  const Tensor2 h = Eigen::Vector3d(0.3, -0.8, 0) * n.transpose();
-  const Tensor2 geometric = stress * h.trace() - stress * h.transpose();
-  EXPECT_LT((geometric * n).norm(), 1e-14);
-}
-
 TEST(Localisation, VonMisesSofteningLocalisesAlongItsPlanesOfShear) {
   VonMisesLaw law{.young = 1000, .poisson = 0.25, .yield_stress = 6, .hardening = -40, .residual_stress = 2};
   const auto determinant = [](const AnalyticLaw& material, double a, double* angle) {

@@ -13,6 +13,7 @@
 #include "errors.hpp"
 #include "history.hpp"
 #include "log.hpp"
+#include "own_folder.hpp"
 #include "summary.hpp"
 
 namespace femxdem {
@@ -20,23 +21,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, removed at its end.
-class ResultsTest : public testing::Test {
+class ResultsTest : public OwnFolder {
  protected:
-  ResultsTest()
-      : folder_(fs::temp_directory_path() / ("femxdem_results_" + std::to_string(getpid()) + "_" +
-                                             testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::remove_all(folder_);
-  }
-  ~ResultsTest() override { fs::remove_all(folder_); }
-
   std::string text(const char* name) const {
     std::ostringstream all;
     all << std::ifstream(folder_ / name).rdbuf();
     return all.str();
   }
-
-  fs::path folder_;
 };
 
 /// Two unit squares side by side: 13 nodes, 2 x 4 points.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import adoption
-from cells import FRICTION, element, engine, measure, rate, select
+from cells import FRICTION, element, engine, measure, rate, select, users
 
 EXAMPLES = Path("/usr/share/doc/yade/examples")
 SCRIPT = """
@@ -50,7 +50,7 @@ class Folder(unittest.TestCase):
     def script(self, end="O.run()\nO.wait()", spheres="60"):
         path = self.folder / "theirs.py"
         path.write_text(SCRIPT + end + "\n")
-        return {"source": "script", "script": str(path), "arguments": [spheres], "script_seconds": 120.0}
+        return users("script", path, arguments=[spheres], script_seconds=120.0)
 
 
 class Script(Folder):
@@ -103,7 +103,7 @@ class Script(Folder):
 
     def test_missing_script(self):
         with self.assertRaisesRegex(ValueError, "ve.script = .*no such file"):
-            engine().make_template({"source": "script", "script": "/nowhere/theirs.py"})
+            engine().make_template(users("script", "/nowhere/theirs.py"))
 
 
 class Scene(Folder):
@@ -115,7 +115,7 @@ class Scene(Folder):
             path = self.folder / name
             select(ve)
             O.save(str(path))
-            made = engine().make_template({"source": "scene", "scene": str(path)})
+            made = engine().make_template(users("scene", path))
             other = engine().add(made["state"])
             stress, _, F = measure(other)
             np.testing.assert_array_equal(F, np.eye(3))
@@ -124,11 +124,11 @@ class Scene(Folder):
 
     def test_missing_and_broken_scenes(self):
         with self.assertRaisesRegex(ValueError, "ve.scene = .*no such file"):
-            engine().make_template({"source": "scene", "scene": "/nowhere/scene.yade.gz"})
+            engine().make_template(users("scene", "/nowhere/scene.yade.gz"))
         broken = self.folder / "broken.xml"
         broken.write_text("<nothing/>")
         with self.assertRaisesRegex(ValueError, "cannot be loaded"):
-            engine().make_template({"source": "scene", "scene": str(broken)})
+            engine().make_template(users("scene", broken))
 
 
 @unittest.skipUnless(EXAMPLES.is_dir(), "YADE's examples are not installed")
@@ -156,8 +156,7 @@ class ShippedExamples(unittest.TestCase):
             os.chdir(folder)
             random.seed(1)  # periodic-grow.py places its grains at random
             try:
-                spec = {"source": "script", "script": str(EXAMPLES / name), "script_steps": steps}
-                return engine().make_template(spec)
+                return engine().make_template(users("script", EXAMPLES / name, script_steps=steps))
             finally:
                 os.chdir(here)
 

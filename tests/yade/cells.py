@@ -13,8 +13,28 @@ FIELDS = (
     "adhesive_contacts stress_asymmetry sliding_contacts contacts"
 ).split()
 SPHERES = 60
-FRICTION = {"spheres": SPHERES, "contact_law": "friction"}
-ADHESIVE = {"spheres": SPHERES, "cohesion": 1.0}
+PACKING = {
+    "source": "prepare", "spheres": SPHERES, "size_ratio": 1.5, "kappa": 500.0, "stiffness_ratio": 1.0, "friction": 0.5,
+    "compaction_friction": 0.0, "cohesion": 0.0, "contact_law": "adhesive", "new_contacts": "frictional", "confining_stress": 1e5,
+    "mean_diameter": 1e-3, "density": 2600.0, "damping": 0.2, "seed": 1, "time_step_safety": 0.8
+}  # fmt: skip
+
+
+def packing(**changes):
+    """Whole specification of a prepared packing, as the program hands it over: PACKING but for `changes`."""
+    unknown = changes.keys() - PACKING.keys()
+    if unknown:
+        raise ValueError(f"no packing has {', '.join(sorted(unknown))}")
+    return {**PACKING, **changes}
+
+
+def users(source, path, **more):
+    """Whole specification of a user's `script` or `scene`."""
+    return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **more}
+
+
+FRICTION = packing(contact_law="friction")
+ADHESIVE = packing(cohesion=1.0)
 
 
 @cache

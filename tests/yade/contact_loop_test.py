@@ -5,9 +5,9 @@ import unittest
 import numpy as np
 
 import contact_loop
-from cells import ADHESIVE, engine, element, rate, select
+from cells import ADHESIVE, element, engine, packing, rate, select
 
-SPEC = {"spheres": 200, "contact_law": "friction", "stiffness_ratio": 2.0}
+SPEC = packing(spheres=200, contact_law="friction", stiffness_ratio=2.0)
 SHEAR = [[0.3, 1.0, 0.2], [0.0, -0.3, 0.4], [0.1, 0.0, 0.0]]
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cells import engine, mandel, measure, select, stiffness
+from cells import engine, mandel, measure, select, stiffness, users
 
 SCRIPT = """
 from yade import pack
@@ -74,7 +74,7 @@ def element(model, **changes):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "theirs.py"
         path.write_text(SCRIPT % {**DEFAULTS, **MODELS[model], **changes})
-        made = engine().make_template({"source": "script", "script": str(path), "script_steps": 60_000})
+        made = engine().make_template(users("script", path, script_steps=60_000))
     print(model, {k: made["manifest"][k] for k in ("spheres", "contacts", "unbalanced_force", "notes", "porosity")})
     return engine().add(made["state"]), made["manifest"]
 

@@ -4,26 +4,20 @@ import unittest
 
 import numpy as np
 
+import cells
 import contact_loop
 import packing
 from cells import ADHESIVE, FRICTION, element, engine, measure, select, template
 
 BONDED = {**ADHESIVE, "contact_law": "bonded"}
-SOFT = {
-    "spheres": 60,
-    "kappa": 100.0,
-    "stiffness_ratio": 2.0,
-    "size_ratio": 3.0,
-    "cohesion": 2.0,
-    "confining_stress": 2e5,
-}
+SOFT = cells.packing(kappa=100.0, stiffness_ratio=2.0, size_ratio=3.0, cohesion=2.0, confining_stress=2e5)
 
 
 class Equilibrium(unittest.TestCase):
     def test_isotropic_stress_within_a_thousandth_and_at_rest(self):
         for spec in (FRICTION, ADHESIVE, BONDED, SOFT):
             with self.subTest(spec):
-                sigma = spec.get("confining_stress", 1e5)
+                sigma = spec["confining_stress"]
                 stress, report, F = measure(element(spec))
                 np.testing.assert_allclose(stress, -sigma * np.eye(3), rtol=0, atol=1e-3 * sigma)
                 self.assertLess(report["unbalanced_force"], 1e-4)
@@ -87,7 +81,7 @@ class Refusals(unittest.TestCase):
             ({"kappa": -1.0}, "kappa > 0"),
         ):
             with self.subTest(wrong), self.assertRaisesRegex(ValueError, sentence):
-                packing.prepare(None, wrong)
+                packing.prepare(None, cells.packing(**wrong))
 
 
 if __name__ == "__main__":

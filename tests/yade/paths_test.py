@@ -5,9 +5,9 @@ import unittest
 import numpy as np
 
 import contact_loop
-from cells import element, engine, measure, rate, select
+from cells import FRICTION, element, engine, measure, packing, rate, select
 
-SPEC = {"spheres": 100, "contact_law": "friction"}
+SPEC = packing(spheres=100, contact_law="friction")
 BIAXIAL = np.diag([0.5, -1.0, 0.0])
 SHEAR = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -102,7 +102,7 @@ class Distortion(unittest.TestCase):
         self.assertAlmostEqual(measure(ve)[2][0, 1], 0.5, delta=1e-9)
 
     def test_a_cell_that_gets_too_narrow_is_refused(self):
-        ve = element({"spheres": 60, "contact_law": "friction"})
+        ve = element(FRICTION)
         with self.assertRaisesRegex(RuntimeError, "too narrow"):
             for _ in range(30):
                 strained(ve, SHEAR, 0.2, 5e-2)

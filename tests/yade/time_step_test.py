@@ -6,15 +6,15 @@ import numpy as np
 
 import contact_loop
 import contact_models_test as contact_models
-from cells import engine, measure, rate, select, template
+from cells import FRICTION, engine, measure, rate, select, template
 from time_step import critical_time_step
 
 BIAXIAL = [[0.5, 0, 0], [0, -1, 0], [0, 0, 0]]
 CELLS = (
-    {"spheres": 60, "contact_law": "friction"},
-    {"spheres": 60, "contact_law": "friction", "kappa": 100.0, "stiffness_ratio": 0.5},
-    {"spheres": 60, "contact_law": "friction", "kappa": 5000.0, "stiffness_ratio": 5.0},
-    {"spheres": 60, "contact_law": "friction", "kappa": 100.0, "stiffness_ratio": 0.2, "size_ratio": 1.0},
+    FRICTION,
+    {**FRICTION, "kappa": 100.0, "stiffness_ratio": 0.5},
+    {**FRICTION, "kappa": 5000.0, "stiffness_ratio": 5.0},
+    {**FRICTION, "kappa": 100.0, "stiffness_ratio": 0.2, "size_ratio": 1.0},
 )
 
 

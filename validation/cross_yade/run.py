@@ -1,15 +1,13 @@
 #!/usr/bin/python3
 """One element driven by the finite-element master against YADE alone, on the same packings.
 
-    validation/cross_yade/run.py [--femxdem PROGRAM] [--out FOLDER] [--spheres N] [--seeds 1 2 3 4 5] [--laws NAME ...]
-                                 [--paths NAME ...] [--limit DISTANCE]
+    validation/cross_yade/run.py [--spheres N] [--seeds 1 2 3 4 5] [--laws NAME ...] [--paths NAME ...] [--limit DISTANCE]
+                                 [--list] [--record] [--runs FOLDER]
 
-Writes FOLDER/table.csv, table.md and cross_yade.png after every row (a law on a path, all seeds), those of the paper's
-case first; curves that are there already are not computed again. Exit status 1 where an element is further from YADE alone
-than --limit.
+Table and figure after every row (a law on a path, all seeds), those of the paper's case first. Exit status 1 where an
+element is further from YADE alone than --limit.
 """
 
-import argparse
 import csv
 import functools
 import json
@@ -18,15 +16,16 @@ import subprocess
 import sys
 from pathlib import Path
 
-import matplotlib
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
 
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
 from paths import CONFINING_STRESS, INCREMENT, PATHS
+from results import read_columns
 
-HERE = Path(__file__).resolve().parent
 LAWS = {"cohesive": 'contact_law = "adhesive"\ncohesion = 1.0', "cohesionless": 'contact_law = "friction"\ncohesion = 0.0'}
 INERTIAL_NUMBER = 5e-3
 RATES = {"yade": 1.0, "yade_0.7_rate": 0.7, "yade_half_rate": 0.5}  # of YADE alone, over the element's
@@ -37,7 +36,7 @@ CASE = """# Made by validation/cross_yade/run.py: the volume element of one pack
 type = "volume_element"
 
 [ve]
-cache = "{cache}"
+cache = "../packings"
 spheres = {spheres}
 seed = {seed}
 confining_stress = {stress!r}
@@ -51,70 +50,48 @@ tolerance = 2e-4
 {path}"""
 
 
-def sh(command, log):
-    with open(log, "a") as stream:
-        subprocess.run([str(word) for word in command], check=True, stdout=stream, stderr=stream)
-
-
-def case_file(folder, law, seed, path, spheres):
-    file = folder / "cases" / f"{law}_{seed}_{path.name}.toml"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    text = CASE.format(cache="../packings", spheres=spheres, seed=seed, stress=CONFINING_STRESS,
-                       inertial_number=INERTIAL_NUMBER, law=LAWS[law], path=path.segments())
+def case_file(c, law, seed, path, spheres):
+    file = c.runs / "cases" / f"{law}_{seed}_{path.name}.toml"
+    file.parent.mkdir(exist_ok=True)
+    text = CASE.format(spheres=spheres, seed=seed, stress=CONFINING_STRESS, inertial_number=INERTIAL_NUMBER, law=LAWS[law],
+                       path=path.segments())
     file.write_text(text)
     return file
 
 
 @functools.cache
-def packing(program, folder, law, seed, spheres):
+def packing(program, case):
     """State file of a volume element and its manifest, prepared where the cache does not have it."""
-    case = case_file(folder, law, seed, PATHS["biaxial"], spheres)
     text = subprocess.run([program, "ve", "prepare", case], check=True, capture_output=True, text=True).stdout
     state = Path(re.search(r"(\S+\.state)", text)[1])
     return state, json.loads(state.with_suffix(".json").read_text())
 
 
-def compute(program, folder, law, seed, path, spheres):
-    """The curves of one packing on one path, as files."""
-    case = case_file(folder, law, seed, path, spheres)
-    log = folder / "log.txt"
-    run = folder / "element" / case.stem
-    if not done(run):
-        sh([program, "ve", "path", case, "--out", run, "--overwrite"], log)
-    missing = [name for name in RATES if not yade_curve(folder, case, name).exists()]
-    if not missing:
-        return case
-    state, manifest = packing(program, folder, law, seed, spheres)
-    for name in missing:
-        rate = INERTIAL_NUMBER / manifest["time_scale"] / path.rate() * RATES[name]
-        curve = yade_curve(folder, case, name)
-        curve.parent.mkdir(exist_ok=True)
-        sh(["/usr/bin/python3", HERE / "yade_alone.py", state, path.name, rate, curve], log)
-    return case
+def compute(c, law, seed, path, spheres):
+    """Columns of one packing on one path: of the element, and of YADE alone at each rate."""
+    case = case_file(c, law, seed, path, spheres)
+    element = c.path(case, f"element/{case.stem}")
+    if element.status != 0:
+        raise campaign.CampaignError(f"{element.folder}: {element.last_words()}")
+    state, manifest = packing(c.program, case_file(c, law, seed, PATHS["biaxial"], spheres))
+    found = {"element": element.history()}
+    for name, factor in RATES.items():
+        rate = INERTIAL_NUMBER / manifest["time_scale"] / path.rate() * factor
+        table = c.runs / name / case.stem / "curve.csv"
+        command = ["/usr/bin/python3", HERE / "yade_alone.py", state, path.name, str(rate), table]
+        alone = c.once(f"{name}/{case.stem}", {"state": state.name, "path": path.name, "rate": rate},
+                       lambda said: subprocess.run(command, stdout=said, stderr=said, env=campaign.ENVIRONMENT).returncode)
+        if alone.status != 0:
+            raise campaign.CampaignError(f"{alone.folder}: {alone.last_words()}")
+        found[name] = read_columns(table)
+    return found
 
 
-def done(run):
-    summary = run / "summary.json"
-    return summary.exists() and json.loads(summary.read_text())["status"] == "done"
-
-
-def yade_curve(folder, case, name):
-    return folder / name / f"{case.stem}.csv"
-
-
-def columns(file):
-    with open(file, newline="") as stream:
-        rows = list(csv.reader(stream))
-    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T))
-
-
-def curve(folder, case, name, path):
+def curve(columns, name, path):
     """Stresses over sigma_0 (points, 4), compression positive but shear as it is, and volumetric strain, at the element's
     increments of the way that the driven strain has gone."""
-    c = columns(folder / "element" / case.stem / "history.csv" if name == "element" else yade_curve(folder, case, name))
-    if name == "element":
-        c["shear"] = c["F_12"]
-    driven = c["shear"] if path.name == "simple_shear" else c["strain_yy"]
+    c, shear = columns, "F_12" if name == "element" else "shear"
+    driven = c[shear] if path.name == "simple_shear" else c["strain_yy"]
     way = np.concatenate([[0], np.abs(np.diff(driven)).cumsum()])
     stress = np.stack([c[s] for s in STRESSES], axis=1) / CONFINING_STRESS * np.array([-1, -1, -1, 1])
     volume = c["strain_xx"] + c["strain_yy"] + c["strain_zz"]
@@ -151,9 +128,9 @@ HEADER = ("law", "path", "seed") + tuple(
     for what in ("", "_volume"))
 
 
-def write_tables(folder, results):
-    """table.csv: every packing; table.md: means over the seeds, in per cent."""
-    with open(folder / "table.csv", "w", newline="") as stream:
+def write_tables(c, results):
+    """table.csv: every packing; the table: means over the seeds, in per cent."""
+    with open(c.product("table.csv"), "w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(HEADER)
         for (law, name), curves_of_seeds in results.items():
@@ -169,10 +146,11 @@ def write_tables(folder, results):
         text = [word for e, y in pairs for word in (with_volume(e), with_volume(y), f"{e[0] / y[0]:.2f}")]
         text.append(with_volume(100 * scatter(list(curves_of_seeds.values()))))
         lines.append(f"| {law} | {name.replace('_', ' ')} | " + " | ".join(text) + " |")
-    (folder / "table.md").write_text("\n".join(lines) + "\n")
+    c.table(lines)
+    return lines
 
 
-def draw(folder, results):
+def draw(file, results):
     names = list(dict.fromkeys(name for _, name in results))
     laws = list(dict.fromkeys(law for law, _ in results))
     figure, axes = plt.subplots(len(laws), len(names), figsize=(2.6 * len(names), 2.6 * len(laws)), squeeze=False)
@@ -192,7 +170,8 @@ def draw(folder, results):
         row[0].set_ylabel(r"$\sigma_{yy}/\sigma_0$ (shear: $\sigma_{xy}/\sigma_0$)", fontsize=7)
     figure.suptitle("points: element; lines: YADE alone (dotted: half the rate); colours: seeds", fontsize=8)
     figure.tight_layout()
-    figure.savefig(folder / "cross_yade.png", dpi=90)
+    figure.savefig(file, dpi=90)
+    plt.close(figure)
 
 
 def rows_in_order(laws, paths):
@@ -202,28 +181,30 @@ def rows_in_order(laws, paths):
     return [(law, path) for group in (first, rest) for law in laws for path in group]
 
 
+def follow(c, a):
+    results, lines = {}, []
+    for law, name in rows_in_order(a.laws, a.paths):
+        for seed in a.seeds:
+            columns = compute(c, law, seed, PATHS[name], a.spheres)
+            curves = {series: curve(columns[series], series, PATHS[name]) for series in ("element", *RATES)}
+            results.setdefault((law, name), {})[seed] = curves
+            print(law, seed, name, " ".join(f"{x:.2e}" for x in np.concatenate(distances(curves))[:, 0]), flush=True)
+        lines = write_tables(c, results)
+        draw(c.product("cross_yade.png"), results)
+    print("\n".join(lines))
+    return int(any(distances(one)[0][:, 0].max() > a.limit for seeds in results.values() for one in seeds.values()))
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
-    parser.add_argument("--out", type=Path, default=Path("out/cross_yade"))
+    parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--spheres", type=int, default=1000)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS))
     parser.add_argument("--paths", nargs="+", choices=PATHS, default=list(PATHS))
     parser.add_argument("--limit", type=float, default=float("inf"), help="of the distance of stresses, relative")
     a = parser.parse_args()
-    program, folder = Path(a.femxdem).resolve(), a.out.resolve()
-    results = {}
-    for law, name in rows_in_order(a.laws, a.paths):
-        for seed in a.seeds:
-            case = compute(program, folder, law, seed, PATHS[name], a.spheres)
-            curves = {series: curve(folder, case, series, PATHS[name]) for series in ("element", *RATES)}
-            results.setdefault((law, name), {})[seed] = curves
-            print(law, seed, name, " ".join(f"{x:.2e}" for x in np.concatenate(distances(curves))[:, 0]), flush=True)
-        write_tables(folder, results)
-        draw(folder, results)
-    print((folder / "table.md").read_text())
-    return int(any(distances(c)[0][:, 0].max() > a.limit for seeds in results.values() for c in seeds.values()))
+    rows = {f"{law}_{path}": f"{len(a.seeds)} packings" for law, path in rows_in_order(a.laws, a.paths)}
+    return campaign.main(HERE, a, rows, lambda c: follow(c, a))
 
 
 if __name__ == "__main__":

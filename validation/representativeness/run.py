@@ -1,28 +1,25 @@
 #!/usr/bin/python3
 """How many spheres a volume element needs: stress at the peak and past it over spheres, seeds and size ratios.
 
-    validation/representativeness/run.py [--femxdem PROGRAM] [--out FOLDER] [--cache FOLDER] [--spheres N ...]
-                                         [--size-ratios R ...] [--most-seeds K]
+    validation/representativeness/run.py [--spheres N ...] [--size-ratios R ...] [--most-seeds K] [--list] [--record]
 
-The biaxial path of validation/ve_biaxial to 5 %, every packing prepared on its own. Writes FOLDER/table.csv, table.md and
-representativeness.png after every group of seeds; runs that are done already are not repeated.
+The biaxial path of validation/ve_biaxial to 5 %, every packing prepared on its own. Table and figure after every group of
+seeds.
 """
 
-import argparse
 import csv
 import sys
 from pathlib import Path
 
-import matplotlib
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
 
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
 from results import path_curve
-from ve_runs import dem_steps, strain_until, ve_path
+from ve_runs import biaxial, dem_steps, strain_until
 
 STRAIN, RESIDUAL_FROM = 0.05, 0.04
 SEEDS = {100: 5, 200: 5, 400: 5, 1000: 3, 2000: 3, 4000: 2}
@@ -36,17 +33,16 @@ def values(folder):
     return curve.stress[peak], curve.strain[peak], residual, dem_steps(folder)
 
 
-def group(program, a, ratio, spheres, seeds):
+def group(c, ratio, spheres, seeds):
     """Values (seeds, 4) of one group; seeds whose run ended early are left out, and said."""
     found = []
     for seed in range(1, seeds + 1):
-        folder = a.out / f"ratio_{ratio:g}" / f"{spheres}_{seed}"
-        settings = {"ve.spheres": spheres, "ve.seed": seed, "ve.size_ratio": float(ratio), "ve.cache": a.cache.resolve()}
-        summary = ve_path(program, folder, {**settings, **strain_until(STRAIN)})
-        if summary["status"] == "done":
-            found.append(values(folder))
+        settings = {"ve.spheres": spheres, "ve.seed": seed, "ve.size_ratio": float(ratio), **strain_until(STRAIN)}
+        folder, early = biaxial(c, f"ratio_{ratio:g}/{spheres}_{seed}", settings)
+        if early:
+            print(f"left out: {folder}: {early}", flush=True)
         else:
-            print(f"left out: {folder}: {summary['message']}", flush=True)
+            found.append(values(folder))
     return np.array(found)
 
 
@@ -64,17 +60,17 @@ def table_lines(groups):
     return lines
 
 
-def write(folder, groups):
-    with open(folder / "table.csv", "w", newline="") as stream:
+def write(c, groups):
+    with open(c.product("table.csv"), "w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(["size_ratio", "spheres", "seed", "peak", "strain_at_peak", "residual", "dem_steps"])
         for (ratio, spheres), v in groups.items():
             for seed, row in enumerate(v, 1):
                 writer.writerow([ratio, spheres, seed] + [f"{x:.6g}" for x in row])
-    (folder / "table.md").write_text("\n".join(table_lines(groups)) + "\n")
+    c.table(table_lines(groups))
 
 
-def draw(folder, groups):
+def draw(file, groups):
     figure, axes = plt.subplots(1, 3, figsize=(9, 3))
     for k, ratio in enumerate(dict.fromkeys(r for r, _ in groups)):
         chosen = {n: v for (r, n), v in groups.items() if r == ratio and len(v)}
@@ -93,28 +89,29 @@ def draw(folder, groups):
         one.grid(alpha=0.3, which="both")
         one.legend(fontsize=6)
     figure.tight_layout()
-    figure.savefig(folder / "representativeness.png", dpi=90)
+    figure.savefig(file, dpi=90)
     plt.close(figure)
 
 
+def follow(c, a):
+    groups = {}
+    for spheres in a.spheres:
+        for ratio in a.size_ratios:
+            groups[ratio, spheres] = group(c, ratio, spheres, min(SEEDS[spheres], a.most_seeds))
+            print(table_lines({(ratio, spheres): groups[ratio, spheres]})[-1], flush=True)
+            write(c, groups)
+            draw(c.product("representativeness.png"), groups)
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
-    parser.add_argument("--out", type=Path, default=Path("out/representativeness"))
-    parser.add_argument("--cache", type=Path, default=Path("packings"))
+    parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--spheres", type=int, nargs="+", choices=SEEDS, default=list(SEEDS))
     parser.add_argument("--size-ratios", type=float, nargs="+", default=[1.5, 3.0])
     parser.add_argument("--most-seeds", type=int, default=5)
     a = parser.parse_args()
-    a.out.mkdir(parents=True, exist_ok=True)
-    groups = {}
-    for spheres in a.spheres:
-        for ratio in a.size_ratios:
-            groups[ratio, spheres] = group(Path(a.femxdem).resolve(), a, ratio, spheres, min(SEEDS[spheres], a.most_seeds))
-            print(table_lines({(ratio, spheres): groups[ratio, spheres]})[-1], flush=True)
-            write(a.out, groups)
-            draw(a.out, groups)
+    rows = {f"ratio_{ratio:g}/{n}": f"{min(SEEDS[n], a.most_seeds)} seeds" for n in a.spheres for ratio in a.size_ratios}
+    return campaign.main(HERE, a, rows, lambda c: follow(c, a))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,32 +1,29 @@
 #!/usr/bin/python3
 """Solution strategies on one case: strategy x tolerance x increment, as a table and a figure.
 
-    validation/solver/run.py [CASE.toml] [--ve] [--femxdem build/release/femxdem] [--out out/solver]
-                             [--strategies NAME ...] [--tolerances T ...] [--increments S ...] [--seeds N ...] [--end SECONDS]
-                             [--as-they-are]
+    validation/solver/run.py [--case CASE.toml] [--ve] [--strategies NAME ...] [--tolerances T ...] [--increments S ...]
+                             [--seeds N ...] [--end SECONDS] [--as-they-are] [--list] [--record] [--runs FOLDER] [--ranks N]
 
 Without a case: biaxial_law.toml of this folder, a softening law in closed form (seconds a run); --ve: the same body on
-volume elements of 200 spheres, biaxial_ve.toml, half an hour to hours a run, one a seed. An evaluation is one straining of
-every material point, those of rejected steps included; the peak is that of the first monitor. Distances are those from the
-first run's of the same seed. Runs that have ended are not repeated; with --as-they-are none is started and those that
-were interrupted are taken as far as they came.
+volume elements of 200 spheres, biaxial_ve.toml, half an hour to hours a run, one a seed, with a checkpoint every 10 steps. An
+evaluation is one straining of every material point, those of rejected steps included; the peak is that of the first
+monitor. Distances are those from the first run's of the same seed. With --as-they-are none is started and those that were
+interrupted are taken as far as they came.
 """
 
-import argparse
-import csv
 import itertools
-import json
 import re
 import shutil
-import subprocess
+import sys
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
+
+import matplotlib.pyplot as plt
+import numpy as np
+
 STRATEGIES = {
     "quasi_newton": ["solver.operator=quasi_newton"],
     "quasi_newton_line_search": ["solver.operator=quasi_newton", "solver.line_search=true"],
@@ -41,128 +38,126 @@ STRATEGIES = {
 CLOSED_FORM_ONLY = {"newton", "newton_line_search"}
 
 
-def run(femxdem, case, folder, overrides):
-    command = [femxdem, "run", case, "--out", folder, "--overwrite"]
-    for override in overrides:
-        command += ["--set", override]
-    subprocess.run(command, stdout=subprocess.DEVNULL)
-
-
-def read(folder):
-    """Rows of history.csv, rejected attempts by their reason."""
-    with open(folder / "history.csv") as file:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-    rejected = re.findall(r"rejected: (\w+)", (folder / "log.txt").read_text())
-    return rows, rejected
-
-
-def measure(rows, rejected, monitor, end):
+def measure(history, rejected, monitor, end):
     """One line of the table: evaluations a step before and past the peak, and what went wrong."""
-    if not rows:
-        return {"steps": 0, "failures": len(rejected)}
-    force = [abs(row[monitor]) for row in rows]
-    peak = force.index(max(force))
-    before, past = rows[: peak + 1], rows[peak + 1 :]
-
-    def mean(part):
-        return sum(row["evaluations"] for row in part) / len(part) if part else float("nan")
-
-    return {"steps": len(rows), "before": mean(before), "past": mean(past), "most": max(row["evaluations"] for row in rows),
-            "evaluations": sum(row["evaluations"] for row in rows), "failures": len(rejected),
-            "smallest step": min(b["time"] - a["time"] for a, b in zip([{"time": 0}] + rows, rows)),
-            "reached": rows[-1]["time"] / end, "peak": max(force)}
+    if not history:
+        return {"steps": 0, "failures": rejected}
+    force, evaluations = np.abs(history[monitor]), history["evaluations"]
+    past = int(np.argmax(force)) + 1
+    mean = lambda part: part.mean() if len(part) else float("nan")
+    return {"steps": len(force), "before": mean(evaluations[:past]), "past": mean(evaluations[past:]), "most": evaluations.max(),
+            "evaluations": evaluations.sum(), "failures": rejected, "smallest step": np.diff(history["time"], prepend=0.0).min(),
+            "reached": history["time"][-1] / end, "peak": force.max()}
 
 
-def distance(rows, reference, monitor):
-    """Largest difference of two curves over the reference's peak, before and past it, on the times of the reference."""
-    times, forces = [row["time"] for row in rows], [abs(row[monitor]) for row in rows]
-    peak = max(abs(row[monitor]) for row in reference)
-    of_peak = next(row["time"] for row in reference if abs(row[monitor]) == peak)
-    worst = [0.0, 0.0]
-    for row in reference:
-        later = next((i for i, t in enumerate(times) if t >= row["time"] * (1 - 1e-9)), None)
-        if later is None:
-            break
-        t0, f0 = (times[later - 1], forces[later - 1]) if later else (0.0, forces[0])
-        t1, f1 = times[later], forces[later]
-        value = f1 if t1 == t0 else f0 + (f1 - f0) * (row["time"] - t0) / (t1 - t0)
-        past = row["time"] > of_peak
-        worst[past] = max(worst[past], abs(value - abs(row[monitor])) / peak)
-    return worst
+def distance(history, reference, monitor):
+    """Largest difference of two curves over the reference's peak, before and past it, on the times of the reference that
+    the other one reaches."""
+    if not history or not reference:
+        return 0.0, 0.0
+    time, wanted = reference["time"], np.abs(reference[monitor])
+    reached = time * (1 - 1e-9) <= history["time"][-1]
+    off = np.abs(np.interp(time, history["time"], np.abs(history[monitor])) - wanted) / wanted.max()
+    before = time <= time[np.argmax(wanted)]
+    return max(off[reached & before], default=0.0), max(off[reached & ~before], default=0.0)
+
+
+HEAD = ["strategy", "tolerance", "increment [s]", "seed", "mean", "before", "past", "most", "all", "failures", "smallest step [s]",
+        "of the way", "peak", "distance before", "distance past"]
 
 
 def table(lines):
-    head = ["strategy", "tolerance", "increment [s]", "seed", "mean", "before", "past", "most", "all", "failures", "smallest step [s]",
-            "of the way", "peak", "distance before", "distance past"]
-    text = "| " + " | ".join(head) + " |\n|" + "---|" * len(head) + "\n"
+    text = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
     for (name, tolerance, increment, seed), m, (before, past) in lines:
         key = f"| {name} | {tolerance:g} | {increment:g} | {'' if seed is None else seed} | "
         if m["steps"] == 0:
-            text += key + f"no step, {m['failures']} failures |\n"
+            text.append(key + f"no step, {m['failures']} failures |" + " |" * (len(HEAD) - 5))
             continue
-        text += key + (f"{m['evaluations'] / m['steps']:.2f} | {m['before']:.2f} | {m['past']:.2f} | {m['most']:.0f} | "
-                       f"{m['evaluations']:.0f} | {m['failures']} | {m['smallest step']:.2g} | {100 * m['reached']:.0f} % | "
-                       f"{m['peak']:.4g} | {100 * before:.2f} % | {100 * past:.2f} % |\n")
+        text.append(key + f"{m['evaluations'] / m['steps']:.2f} | {m['before']:.2f} | {m['past']:.2f} | {m['most']:.0f} | "
+                    f"{m['evaluations']:.0f} | {m['failures']} | {m['smallest step']:.2g} | {100 * m['reached']:.0f} % | "
+                    f"{m['peak']:.4g} | {100 * before:.2f} % | {100 * past:.2f} % |")
     return text
 
 
 def draw(curves, monitor, file):
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
-    for (name, tolerance, increment, seed), rows in curves:
+    for (name, tolerance, increment, seed), history in curves:
+        if not history:
+            continue
         label = f"{name}, {tolerance:g}, {increment:g} s" + ("" if seed is None else f", seed {seed}")
-        left.plot([r["time"] for r in rows], [abs(r[monitor]) for r in rows], label=label, linewidth=0.9)
-        right.plot([r["time"] for r in rows], [r["evaluations"] for r in rows], ".-", linewidth=0.5, markersize=3)
+        left.plot(history["time"], np.abs(history[monitor]), label=label, linewidth=0.9)
+        right.plot(history["time"], history["evaluations"], ".-", linewidth=0.5, markersize=3)
     left.set(xlabel="time [s]", ylabel=f"|{monitor}|")
     left.legend(fontsize=6)
     right.set(xlabel="time [s]", ylabel="evaluations of a step", yscale="log")
     figure.savefig(file, dpi=110, bbox_inches="tight")
 
 
+class Grid:
+    """The runs that the arguments ask for, (strategy, tolerance, increment, seed) each."""
+
+    def __init__(self, a):
+        self.case = (a.case or HERE / ("biaxial_ve.toml" if a.ve else "biaxial_law.toml")).resolve()
+        text = self.case.read_text()
+        self.monitor = re.search(r'\[\[monitor\]\]\s*name = "(\w+)"', text).group(1)
+        self.closed_form = 'type = "volume_element"' not in text
+        self.end = a.end or (0.6 if self.closed_form else 2.0)
+        self.seeds = [None] if self.closed_form else a.seeds
+        names = [name for name in a.strategies if self.closed_form or name not in CLOSED_FORM_ONLY]
+        self.keys = [(name, tolerance, increment, seed) for increment, tolerance, name, seed in
+                     itertools.product(a.increments, sorted(a.tolerances), names, self.seeds)]
+
+    def name(self, key):
+        name, tolerance, increment, seed = key
+        return "_".join([self.case.stem, name, f"{tolerance:g}", f"{increment:g}"] + ([] if seed is None else [str(seed)]))
+
+    def settings(self, key):
+        name, tolerance, increment, seed = key
+        settings = [f"solver.tolerance={tolerance}", f"control.step={increment}", f"control.max_step={increment}",
+                    f"control.end_time={self.end}", *STRATEGIES[name]]
+        if seed is not None:
+            settings.append(f"ve.seed={seed}")
+        if not self.closed_form and increment < 0.01:
+            settings.append("ve.min_steps=3")  # at 10 steps the rate of small increments is far below the case's
+        return settings
+
+
+def follow(c, grid, as_they_are):
+    lines, curves = [], []
+    for key in grid.keys:
+        every = 0 if grid.closed_form else 10
+        name = grid.name(key)
+        run = c.as_it_is(name) if as_they_are else c.run(grid.case, name, *grid.settings(key), checkpoint_every=every)
+        if run is None:
+            continue
+        if run.status == 2:
+            raise campaign.CampaignError(f"{run.folder}: {run.last_words()}")
+        history = run.history()
+        curves.append((key, history))
+        reference = next(other for one, other in curves if one[3] == key[3])
+        lines.append((key, measure(history, len(run.rejections()), grid.monitor, grid.end), distance(history, reference, grid.monitor)))
+        print(table(lines[-1:])[-1], flush=True)
+        c.table(table(lines), mark="results" if grid.closed_form else "results on volume elements")
+        if key[0] == "quasi_newton" and history:
+            shutil.copy(run.folder / "history.csv", c.runs / f"history_{name}.csv")
+    draw(curves, grid.monitor, c.product("strategies_law.png" if grid.closed_form else "biaxial_ve.png"))
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("case", nargs="?", type=Path)
+    parser = campaign.parser(HERE, __doc__)
+    parser.add_argument("--case", type=Path)
     parser.add_argument("--ve", action="store_true")
-    parser.add_argument("--femxdem", type=Path, default=HERE.parents[1] / "build/release/femxdem")
-    parser.add_argument("--out", type=Path, default=Path("out/solver"))
     parser.add_argument("--strategies", nargs="+", choices=STRATEGIES, default=list(STRATEGIES))
     parser.add_argument("--tolerances", nargs="+", type=float, default=[5e-3, 1e-3])
     parser.add_argument("--increments", nargs="+", type=float, default=[0.02])
-    parser.add_argument("--seeds", nargs="+", type=int, help="with --ve")
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3], help="with --ve")
     parser.add_argument("--end", type=float, help="0.6, with --ve 2 (10 %% of axial strain)")
     parser.add_argument("--as-they-are", action="store_true")
     a = parser.parse_args()
-    case = a.case or HERE / ("biaxial_ve.toml" if a.ve else "biaxial_law.toml")
-    monitor = re.search(r'\[\[monitor\]\]\s*name = "(\w+)"', case.read_text()).group(1)
-    closed_form = 'type = "volume_element"' not in case.read_text()
-    end = a.end or (2.0 if a.ve else 0.6)
-    seeds = [None] if closed_form else a.seeds or [1, 2, 3]
-    lines, curves = [], []
-    for increment, tolerance, name, seed in itertools.product(a.increments, sorted(a.tolerances), a.strategies, seeds):
-        if name in CLOSED_FORM_ONLY and not closed_form:
-            continue
-        key = (name, tolerance, increment, seed)
-        folder = a.out / "_".join([name, f"{tolerance:g}", f"{increment:g}"] + ([] if seed is None else [str(seed)]))
-        overrides = [f"solver.tolerance={tolerance}", f"control.step={increment}", f"control.max_step={increment}",
-                     f"control.end_time={end}", *STRATEGIES[name]]
-        if seed is not None:
-            overrides.append(f"ve.seed={seed}")
-        if not closed_form and increment < 0.01:
-            overrides.append("ve.min_steps=3")  # at 10 steps the rate of small increments is far below the case's
-        if not a.as_they_are and not (folder / "summary.json").exists():
-            run(a.femxdem, case, folder, overrides)
-        if a.as_they_are and not (folder / "history.csv").exists():
-            continue
-        rows, rejected = read(folder)
-        curves.append((key, rows))
-        reference = next(rows for other, rows in curves if other[3] == seed)
-        lines.append((key, measure(rows, rejected, monitor, end),
-                      distance(rows, reference, monitor) if rows and reference else (0.0, 0.0)))
-        print(table(lines[-1:]).splitlines()[-1], flush=True)
-        if name == "quasi_newton":
-            shutil.copy(folder / "history.csv", a.out / f"history_{folder.name}.csv")
-    (a.out / "table.md").write_text(table(lines))
-    draw(curves, monitor, a.out / "strategies.png")
+    grid = Grid(a)
+    return campaign.main(HERE, a, {grid.name(key): "" for key in grid.keys}, lambda c: follow(c, grid, a.as_they_are),
+                         on_meshes=True)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

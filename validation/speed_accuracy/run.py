@@ -1,18 +1,16 @@
 #!/usr/bin/python3
 """Cost of a volume element against its error: spheres x inertial number x time-step safety.
 
-    validation/speed_accuracy/run.py [--femxdem PROGRAM] [--out FOLDER] [--cache FOLDER] [--spheres N ...] [--seeds S ...]
-                                     [--inertial-numbers I ...] [--safeties F ...]
+    validation/speed_accuracy/run.py [--spheres N ...] [--seeds S ...] [--inertial-numbers I ...] [--safeties F ...]
+                                     [--list] [--record] [--runs FOLDER]
 
 The biaxial path of validation/ve_biaxial to 5 %; safeties below the largest only at the three highest rates. Two errors of
 the axial stress, each a root mean square over the path over that of the stress and over the seeds: `same packing`, from the
 same packing at the slowest setting; `total`, from the reference, the mean over the seeds of the most spheres at the slowest
 setting. The reference's own error: what the next faster setting differs from it by (`same packing`), and the standard error
-of its mean over the seeds. Writes FOLDER/table.csv, table.md and speed_accuracy.png; runs that are done already are not
-repeated.
+of its mean over the seeds.
 """
 
-import argparse
 import csv
 import itertools
 import os
@@ -21,36 +19,37 @@ import time
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"
-import matplotlib
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
 
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
-from ve_runs import dem_steps, relative_distance, strain_until, stresses, ve_path
+from ve_runs import biaxial, dem_steps, relative_distance, strain_until, stresses
 
 STRAIN = 0.05
 FINER_RATES = 3  # highest rates at which time steps below the largest are tried
 GRID = np.linspace(0.0, STRAIN, 51)
 
 
-class Campaign:
+def name_of(key):
+    spheres, number, safety, seed = key
+    return f"{spheres}_{number:g}_{safety:g}_{seed}"
+
+
+class Curves:
     """Curves and DEM steps of (spheres, inertial number, safety, seed)."""
 
-    def __init__(self, a):
-        self.a, self.program = a, Path(a.femxdem).resolve()
-        self.curves, self.steps = {}, {}
+    def __init__(self, c):
+        self.c, self.curves, self.steps = c, {}, {}
 
     def run(self, spheres, number, safety, seed):
         key = (spheres, number, safety, seed)
-        folder = self.a.out / f"{spheres}_{number:g}_{safety:g}_{seed}"
-        settings = {"ve.spheres": spheres, "ve.inertial_number": number, "ve.time_step_safety": safety, "ve.seed": seed,
-                    "ve.cache": self.a.cache.resolve()}
-        summary = ve_path(self.program, folder, {**settings, **strain_until(STRAIN)})
-        if summary["status"] != "done":
-            print(f"left out: {folder}: {summary['message']}", flush=True)
+        settings = {"ve.spheres": spheres, "ve.inertial_number": number, "ve.time_step_safety": safety, "ve.seed": seed}
+        folder, early = biaxial(self.c, name_of(key), {**settings, **strain_until(STRAIN)})
+        if early:
+            print(f"left out: {folder}: {early}", flush=True)
             return
         self.curves[key], self.steps[key] = stresses(folder, GRID), dem_steps(folder)
         print(key, self.steps[key], f"peak {self.curves[key].max():.2f}", flush=True)
@@ -86,7 +85,7 @@ class Campaign:
 
 def seconds_a_step(spheres, cache):
     """Core seconds of one DEM step, by process time, the least of five blocks: a busy machine does not count."""
-    sys.path.insert(0, str(HERE.parent.parent / "yade_scripts"))
+    sys.path.insert(0, str(campaign.ROOT / "yade_scripts"))
     from volume_element import Engine
 
     engine = seconds_a_step.engine = getattr(seconds_a_step, "engine", None) or Engine(("unbalanced_force",))
@@ -111,11 +110,11 @@ def front(rows, cost, error):
     return [r for r in rows if not any(o[cost] <= r[cost] and o[error] < r[error] for o in rows)]
 
 
-def rows_of(campaign, seconds):
+def rows_of(curves, seconds):
     rows = []
-    for setting in campaign.settings():
-        same, total = campaign.errors(setting)
-        steps = campaign.mean_steps(setting)
+    for setting in curves.settings():
+        same, total = curves.errors(setting)
+        steps = curves.mean_steps(setting)
         rows.append({"spheres": setting[0], "inertial_number": setting[1], "safety": setting[2], "dem_steps": steps,
                      "sphere_steps": steps * setting[0], "core_seconds": steps * seconds[setting[0]], "same_packing": same, "total": total})
     chosen = front(rows, "sphere_steps", "total")
@@ -124,8 +123,8 @@ def rows_of(campaign, seconds):
     return sorted(rows, key=lambda r: r["sphere_steps"])
 
 
-def write(folder, rows):
-    with open(folder / "table.csv", "w", newline="") as stream:
+def write(c, rows):
+    with open(c.product("table.csv"), "w", newline="") as stream:
         writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
         writer.writerows(rows)
@@ -135,10 +134,11 @@ def write(folder, rows):
         lines.append(f"| {r['spheres']} | {r['inertial_number']:g} | {r['safety']:g} | {r['dem_steps']:.0f} | "
                      f"{1e-6 * r['sphere_steps']:.2f} | {r['core_seconds']:.2f} | "
                      f"{100 * r['same_packing']:.1f} | {100 * r['total']:.1f} | {'yes' if r['front'] else ''} |")
-    (folder / "table.md").write_text("\n".join(lines) + "\n")
+    c.table(lines)
+    print("\n".join(lines))
 
 
-def draw(folder, rows):
+def draw(file, rows):
     figure, axes = plt.subplots(1, 2, figsize=(8, 3.3))
     for one, error in zip(axes, ("same_packing", "total")):
         for k, spheres in enumerate(sorted({r["spheres"] for r in rows})):
@@ -155,31 +155,37 @@ def draw(folder, rows):
     axes[1].set_ylabel("error [%], against the reference", fontsize=8)
     axes[1].legend(fontsize=6)
     figure.tight_layout()
-    figure.savefig(folder / "speed_accuracy.png", dpi=90)
+    figure.savefig(file, dpi=90)
+
+
+def keys(a):
+    """(spheres, inertial number, safety, seed) of every run."""
+    fast = sorted(a.inertial_numbers)[-FINER_RATES:]
+    for safety, spheres, seed, number in itertools.product(a.safeties, a.spheres, a.seeds, a.inertial_numbers):
+        if safety == max(a.safeties) or number in fast:
+            yield spheres, number, safety, seed
+
+
+def follow(c, a):
+    curves = Curves(c)
+    for key in keys(a):
+        curves.run(*key)
+    seconds = {n: seconds_a_step(n, c.runs / "packings") for n in a.spheres}
+    rows = rows_of(curves, seconds)
+    write(c, rows)
+    draw(c.product("speed_accuracy.png"), rows)
+    print(f"reference's own scatter of the mean: {100 * curves.reference()[1]:.1f} %; core seconds of a DEM step: {seconds}")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
-    parser.add_argument("--out", type=Path, default=Path("out/speed_accuracy"))
-    parser.add_argument("--cache", type=Path, default=Path("packings"))
+    parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--spheres", type=int, nargs="+", default=[100, 200, 400, 1000])
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--inertial-numbers", type=float, nargs="+", default=[2e-2, 1e-2, 5e-3, 2e-3, 1e-3])
     parser.add_argument("--safeties", type=float, nargs="+", default=[0.8, 0.4])
     a = parser.parse_args()
-    a.out.mkdir(parents=True, exist_ok=True)
-    campaign = Campaign(a)
-    for safety, spheres, seed, number in itertools.product(a.safeties, a.spheres, a.seeds, a.inertial_numbers):
-        if safety == max(a.safeties) or number in sorted(a.inertial_numbers)[-FINER_RATES:]:
-            campaign.run(spheres, number, safety, seed)
-    seconds = {n: seconds_a_step(n, a.cache) for n in a.spheres}
-    rows = rows_of(campaign, seconds)
-    write(a.out, rows)
-    draw(a.out, rows)
-    print((a.out / "table.md").read_text())
-    print(f"reference's own scatter of the mean: {100 * campaign.reference()[1]:.1f} %; core seconds of a DEM step: {seconds}")
+    return campaign.main(HERE, a, {name_of(key): "" for key in keys(a)}, lambda c: follow(c, a))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,13 +1,12 @@
-"""Rows on laws in closed form: the solver where methods fail. Each takes a Program and returns a Row."""
+"""Rows on laws in closed form: the solver where methods fail. Each takes the Campaign and returns a Row."""
 
 import math
 
 import numpy as np
 
-from program import Row
-
 import band
 import results
+from row import Row
 
 WEAK = ('region=[{name="weak",box=[0.33,0.83,0.51,1.01]}]', 'material.region=[{region="weak",cohesion=0.9e5}]', "control.end_time=0.6")
 BAR_FORCE = 0.994091678  # closed form (validation/bilinear_bar), A1 e_l = 1
@@ -20,13 +19,13 @@ def consistent_tangent(program):
     newton = program.run(case, "newton", "solver.operator=tangent", *softening)
     learned = program.run(case, "learned", "solver.operator=quasi_newton", *softening)
     end = newton.history()["time"][-1]
-    return Row(f"operator = tangent stops at {end:.3g} of 0.4 s, exit status {newton.status}: {newton.rejected()} rejected steps, first: "
+    return Row(f"operator = tangent stops at {end:.3g} of 0.4 s, exit status {newton.status}: {len(newton.rejections())} rejected steps, first: "
                f"{newton.reason()}",
                f"operator = quasi_newton (default for volume elements) reaches the end, exit status {learned.status}, "
-               f"{learned.rejected()} rejected steps, {learned.evaluations()} evaluations in {learned.steps()} steps",
+               f"{len(learned.rejections())} rejected steps, {learned.evaluations()} evaluations in {learned.steps()} steps",
                {"Newton's method does not converge": newton.status == 3,
                 "it says that it oscillates or diverges": newton.reason().split()[0] in ("oscillates", "diverges"),
-                "the learned tangents go through without a cut": learned.status == 0 and learned.rejected() == 0})
+                "the learned tangents go through without a cut": learned.status == 0 and len(learned.rejections()) == 0})
 
 
 def newton_cycle(program):
@@ -37,11 +36,11 @@ def newton_cycle(program):
     force = learned.history()["force"][-1] * 21 * 1e3
     other = default.history()["force"][-1] * 21 * 1e3
     return Row(f"operator = tangent, no cutting: exit status {newton.status}, {newton.reason()}",
-               f"quasi_newton with qn_min = -0.2, below the law's slope A2/A1 = -0.1: tolerance 1e-8, {learned.rejected()} rejected steps, "
+               f"quasi_newton with qn_min = -0.2, below the law's slope A2/A1 = -0.1: tolerance 1e-8, {len(learned.rejections())} rejected steps, "
                f"{learned.evaluations()} evaluations in {learned.steps()} steps, force {force:.6f}, closed form {BAR_FORCE:.6f}. The default "
                f"qn_min = 0.02 at 5e-3 ends in another equilibrium: force {other:.4f}",
                {"Newton's method cycles": newton.status == 3 and "oscillates" in newton.reason(),
-                "the learned tangents go through without a cut": learned.status == 0 and learned.rejected() == 0,
+                "the learned tangents go through without a cut": learned.status == 0 and len(learned.rejections()) == 0,
                 "to the closed form within 1e-4": abs(force - BAR_FORCE) < 1e-4 * BAR_FORCE})
 
 
@@ -68,10 +67,10 @@ def large_increments(program):
     cut = program.run(case, "cutting", *settings)
     return Row(f"without cutting (min_step = step = 5e-3 of strain): exit status {whole.status} at {whole.history()['time'][-1]:.2g} s, "
                f"{whole.reason()}; its {whole.steps()} steps are kept",
-               f"default min_step: {cut.rejected()} attempts rejected and cut, end reached, exit status {cut.status}, "
+               f"default min_step: {len(cut.rejections())} attempts rejected and cut, end reached, exit status {cut.status}, "
                f"{cut.evaluations()} evaluations in {cut.steps()} steps",
                {"without cutting the run ends with 3 and its data": whole.status == 3 and whole.steps() > 0,
-                "with cutting it recovers": cut.status == 0 and cut.rejected() > 0 and math.isclose(cut.history()["time"][-1], 0.4)})
+                "with cutting it recovers": cut.status == 0 and len(cut.rejections()) > 0 and math.isclose(cut.history()["time"][-1], 0.4)})
 
 
 def invariant(run):
@@ -156,7 +155,7 @@ def uniqueness(program):
                               "solver.start_time=0.26", f"solver.start_seed={seed}") for seed in range(1, 6)}
     found = {seed: solution(run) for seed, run in runs.items()}
     force = {seed: -run.history()["force"][-1] / 1e5 for seed, run in runs.items()}
-    draw_solutions(runs, force, program.out / "uniqueness.png")
+    draw_solutions(runs, force, program.product("uniqueness.png"))
     bands = {sign for sign in "+-" if any(f"band at {sign}" in text for text in found.values())}
     return Row(f"one material point, or elements that stay homogeneous: {homogeneous:.3f} sigma_0 W at 3.6 %, as if it were the only solution",
                "; ".join(f"start_seed = {seed}: {found[seed]}, {force[seed]:.3f}" for seed in runs),
@@ -167,9 +166,6 @@ def uniqueness(program):
 
 
 def draw_solutions(runs, force, file):
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     from plot import draw_map
@@ -218,7 +214,7 @@ def limit_pressure(program):
     grid = np.linspace(opening[peak], end, 100)
     branch = np.interp(grid, opening, pressure)
     off = {name: np.abs(np.interp(grid, *curve) / branch - 1).max() for name, curve in curves.items() if name != "automatic control"}
-    draw_limit(curves, pressure_curve(load), program.out / "limit_pressure.png")
+    draw_limit(curves, pressure_curve(load), program.product("limit_pressure.png"))
     return Row(f"load control: exit status {load.status} at {pressure_curve(load)[1][-1]:.4f} Pa, opening {pressure_curve(load)[0][-1]:.4f} m: "
                f"{load.reason()}",
                f"automatic control passes the limit {pressure.max():.4f} Pa at {opening[peak]:.4f} m and softens to {branch[-1]:.4f} Pa at "
@@ -232,9 +228,6 @@ def limit_pressure(program):
 
 
 def draw_limit(curves, load, file):
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(5, 3.4))

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The automatic time step over the largest stable one, for stiffness, stiffness ratio and size ratio.
 
-    validation/time_step/run.py [--out FOLDER] [--spheres N] [--seed S]
+    validation/time_step/run.py [--spheres N] [--seed S] [--list] [--record] [--runs FOLDER]
 
 At rest: the prepared packing is left alone, its grains stopped, for 800 steps. A step is unstable if the kinetic energy, which
 comes from what the forces are off balance, ever grows by 100 from its least; the largest stable step is the last one before
@@ -9,27 +9,27 @@ the first unstable one, by 2 % of the critical step. Along a path: each packing 
 (stiff ones by 10/kappa) with many time steps; the largest stable one is found by bisection. A step is unstable where the
 mean kinetic energy of the path's second half exceeds 1.5 times that at 3/4 of the critical step, or the stresses are off by more than 1 % and more than 3 times what half and 3/4 of the critical
 step differ by (where contacts slide, the energy alone does not tell). The automatic step must be stable at rest before and after the path:
-exit status 1 otherwise. Writes FOLDER/table.csv, table.md, with what the stress is off with the automatic step and at 1.5
-times the critical one, and time_step.png; packings that are in table.csv are not repeated.
+exit status 1 otherwise. In the table also what the stress is off with the automatic step and at 1.5 times the critical one.
 """
 
-import argparse
 import csv
+import functools
 import itertools
 import os
 import sys
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"
-import matplotlib
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
 
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent.parent / "yade_scripts"))
+sys.path[:0] = [str(campaign.ROOT / "yade_scripts"), str(campaign.ROOT / "tests" / "yade")]
 import contact_loop
+from cells import packing
 from time_step import critical_time_step
 from volume_element import Engine
 
@@ -165,24 +165,22 @@ FIELDS = ("kappa", "stiffness_ratio", "size_ratio", "automatic", "critical", "p_
           "error", "stable_at_end", "error_beyond")
 
 
-def measure(engine, spec):
-    packing = Packing(engine, spec)
-    stable, beyond = packing.largest_stable()
-    error, stable_at_end = packing.automatic_along_the_path()
-    return {"automatic": packing.automatic, "critical": packing.critical, "p_waves": packing.waves,
-            "stable_at_rest": packing.largest_stable_at_rest(), "largest_stable": stable, "error": error,
+@functools.cache
+def engine():
+    return Engine(("unbalanced_force",))
+
+
+def measure(changes):
+    tried = Packing(engine(), packing(contact_law="friction", **changes))
+    stable, beyond = tried.largest_stable()
+    error, stable_at_end = tried.automatic_along_the_path()
+    return {"automatic": tried.automatic, "critical": tried.critical, "p_waves": tried.waves,
+            "stable_at_rest": tried.largest_stable_at_rest(), "largest_stable": stable, "error": error,
             "stable_at_end": float(stable_at_end), "error_beyond": beyond}
 
 
-def read(file):
-    if not file.exists():
-        return []
-    with open(file, newline="") as stream:
-        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(stream)]
-
-
-def write(folder, rows):
-    with open(folder / "table.csv", "w", newline="") as stream:
+def write(c, rows):
+    with open(c.product("table.csv"), "w", newline="") as stream:
         writer = csv.DictWriter(stream, FIELDS)
         writer.writeheader()
         writer.writerows(rows)
@@ -194,10 +192,10 @@ def write(folder, rows):
         lines.append(f"| {r['kappa']:g} | {r['stiffness_ratio']:g} | {r['size_ratio']:g} | {1e6 * r['automatic']:.2f} | "
                      f"{r['automatic'] / rest:.3f} | {r['automatic'] / path:.2f} | "
                      f"{100 * r['error']:.2f} | {100 * r['error_beyond']:.1f} | {r['p_waves'] / rest:.2f} |")
-    (folder / "table.md").write_text("\n".join(lines) + "\n")
+    c.table(lines)
 
 
-def draw(folder, rows):
+def draw(file, rows):
     figure, axes = plt.subplots(1, len(SIZE_RATIOS), figsize=(9, 3), sharey=True)
     for one, ratio in zip(axes, SIZE_RATIOS):
         for k, (kappa, marker) in enumerate(zip(KAPPAS, "osd")):
@@ -219,30 +217,32 @@ def draw(folder, rows):
     axes[0].legend(fontsize=7)
     figure.suptitle("lines: automatic; dotted: YADE's PWaveTimeStep; above 1: silent garbage", fontsize=8)
     figure.tight_layout()
-    figure.savefig(folder / "time_step.png", dpi=90)
+    figure.savefig(file, dpi=90)
+
+
+GRID = {f"{kappa:g}_{stiffness:g}_{size:g}": {"kappa": kappa, "stiffness_ratio": stiffness, "size_ratio": size}
+        for kappa, stiffness, size in itertools.product(KAPPAS, STIFFNESS_RATIOS, SIZE_RATIOS)}
+
+
+def follow(c, spheres, seed):
+    rows = []
+    for name, changes in GRID.items():
+        asked = {**changes, "spheres": spheres, "seed": seed}
+        rows.append({**changes, **c.value(name, asked, lambda: measure(asked))})
+        r = rows[-1]
+        print(name, f"automatic/largest stable {r['automatic'] / r['stable_at_rest']:.3f} at rest, "
+              f"{r['automatic'] / r['largest_stable']:.3f} along the path, stable at its end: {bool(r['stable_at_end'])}", flush=True)
+        write(c, rows)
+    draw(c.product("time_step.png"), rows)
+    return int(not all(r["stable_at_end"] and r["automatic"] < r["stable_at_rest"] for r in rows))
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("out/time_step"))
+    parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--spheres", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     a = parser.parse_args()
-    a.out.mkdir(parents=True, exist_ok=True)
-    engine, rows = Engine(("unbalanced_force",)), read(a.out / "table.csv")
-    done = {(r["kappa"], r["stiffness_ratio"], r["size_ratio"]) for r in rows}
-    for kappa, stiffness, size in itertools.product(KAPPAS, STIFFNESS_RATIOS, SIZE_RATIOS):
-        if (kappa, stiffness, size) in done:
-            continue
-        spec = {"kappa": kappa, "stiffness_ratio": stiffness, "size_ratio": size}
-        rows.append({**spec, **measure(engine, {**spec, "spheres": a.spheres, "seed": a.seed, "contact_law": "friction"})})
-        r = rows[-1]
-        print(kappa, stiffness, size, f"automatic/largest stable {r['automatic'] / r['stable_at_rest']:.3f} at rest, "
-              f"{r['automatic'] / r['largest_stable']:.3f} along the path, stable at its end: {bool(r['stable_at_end'])}", flush=True)
-        write(a.out, rows)
-    draw(a.out, rows)
-    print((a.out / "table.md").read_text())
-    return int(not all(r["stable_at_end"] and r["automatic"] < r["stable_at_rest"] for r in rows))
+    return campaign.main(HERE, a, {name: "kappa, k_n/k_t, d_max/d_min" for name in GRID}, lambda c: follow(c, a.spheres, a.seed))
 
 
 if __name__ == "__main__":

@@ -1,32 +1,29 @@
 #!/usr/bin/python3
 """The paper's volume element along the biaxial's path, several seeds: curves, peak, value at the end.
 
-    validation/ve_biaxial/run.py [--femxdem PROGRAM] [--out FOLDER] [--seeds 1 2 3] [--spheres N]
-
-Writes FOLDER/table.md and ve_biaxial.png; runs that are done already are not repeated.
+    validation/ve_biaxial/run.py [--seeds 1 2 3] [--spheres N] [--list] [--record] [--runs FOLDER]
 """
 
-import argparse
 import sys
 from pathlib import Path
 
-import matplotlib
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tools"))
+import campaign
 
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
 from results import path_curve, read_history
-from ve_runs import ve_path
+from ve_runs import biaxial
 
 
 def row(folder, seed):
-    """Markdown row: peak, where, value at the end, porosity at start and end, what it cost."""
+    """Markdown row: peak, where, value at 5 % and at the end, porosity at start and end, what it cost."""
     curve, h = path_curve(folder), read_history(folder)
     peak = int(np.argmax(curve.stress))
-    cells = [seed, f"{curve.stress[peak]:.2f}", f"{100 * curve.strain[peak]:.1f}", f"{curve.stress[-10:].mean():.2f}",
+    cells = [seed, f"{curve.stress[peak]:.2f}", f"{100 * curve.strain[peak]:.1f}", f"{np.interp(0.05, curve.strain, curve.stress):.2f}",
+             f"{curve.stress[-10:].mean():.2f}",
              f"{h['porosity'][0]:.3f}", f"{h['porosity'][-1]:.3f}", f"{h['evaluations'][1:].mean():.2f}",
              f"{h['evaluations'].max():.0f}", f"{h['dem_steps'].sum():.0f}"]
     return "| " + " | ".join(map(str, cells)) + " |"
@@ -47,31 +44,32 @@ def draw(folders, file):
     stress.legend(fontsize=7)
     figure.tight_layout()
     figure.savefig(file, dpi=100)
+    plt.close(figure)
 
 
-HEADER = """| seed | peak / sigma_0 | at [%] | at the end (mean of 10) | porosity, start | end | evaluations a step | most | DEM steps |
-|---|---|---|---|---|---|---|---|---|
-"""
+HEADER = [
+    "| seed | peak / sigma_0 | at [%] | at 5 % | at the end (mean of 10) | porosity, start | end | evaluations a step | most | DEM steps |",
+    "|---|---|---|---|---|---|---|---|---|---|",
+]
+
+
+def follow(c, a):
+    folders, rows = {}, []
+    for seed in a.seeds:
+        folders[seed], _ = biaxial(c, f"seed_{seed}", {"ve.seed": seed, "ve.spheres": a.spheres})
+        rows.append(row(folders[seed], seed))
+        print(rows[-1], flush=True)
+        c.table(HEADER + rows)
+        draw(folders, c.product("ve_biaxial.png"))
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--femxdem", default="build/release/femxdem", help="the program")
-    parser.add_argument("--out", type=Path, default=Path("out/ve_biaxial"))
+    parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--spheres", type=int, default=1000)
-    parser.add_argument("--cache", help="folder of prepared packings")
     a = parser.parse_args()
-    cache = {"ve.cache": a.cache} if a.cache else {}
-    folders, rows = {}, []
-    for seed in a.seeds:
-        folders[seed] = a.out / f"seed_{seed}"
-        ve_path(Path(a.femxdem).resolve(), folders[seed], {"ve.seed": seed, "ve.spheres": a.spheres, **cache})
-        rows.append(row(folders[seed], seed))
-        print(rows[-1], flush=True)
-    (a.out / "table.md").write_text(HEADER + "\n".join(rows) + "\n")
-    draw(folders, a.out / "ve_biaxial.png")
+    return campaign.main(HERE, a, {f"seed_{seed}": "" for seed in a.seeds}, lambda c: follow(c, a))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
