@@ -14,11 +14,10 @@ class OwnFolder : public testing::Test {
   OwnFolder() { std::filesystem::remove_all(folder_); }
   ~OwnFolder() override { std::filesystem::remove_all(folder_); }
 
-  const std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() /
-      ("femxdem_" + std::to_string(getpid()) + "_" +
-       testing::UnitTest::GetInstance()->current_test_info()->test_suite_name() + "_" +
-       testing::UnitTest::GetInstance()->current_test_info()->name());
+  const std::filesystem::path folder_ = std::filesystem::temp_directory_path() /
+                                        ("femxdem_" + std::to_string(getpid()) + "_" +
+                                         testing::UnitTest::GetInstance()->current_test_info()->test_suite_name() +
+                                         "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 }  // namespace femxdem

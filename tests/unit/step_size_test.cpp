@@ -40,9 +40,10 @@ TEST(StepSize, GrowsToItsLargestAndEndsAtTheEnd) {
 }
 
 TEST(StepSize, LeavesNoCrumb) {
-  const std::vector<double> steps = walk(StepSize({0.4, 0.01, 0.4, 1, 0.5}, 1), kNever);
-  EXPECT_EQ(steps.size(), 4U) << "0.4, half of 0.6, then what is left in halves of what would leave a crumb";
-  for (const double step : steps) EXPECT_GE(step, 0.1);
+  const std::vector<double> steps = walk(StepSize({0.45, 0.01, 0.45, 1, 0.5}, 1), kNever);
+  ASSERT_EQ(steps.size(), 3U) << "after 0.45 a second one would leave 0.1: half of what is left, twice";
+  EXPECT_NEAR(steps[1], 0.275, 1e-15);
+  EXPECT_NEAR(steps[2], 0.275, 1e-15);
 }
 
 TEST(StepSize, IsCutUntilExhausted) {
