@@ -30,7 +30,8 @@ SAFETY_TAG = "femxdem_time_step_safety"
 
 
 def engines(law, kn, kt, damping):
-    """YADE's engine list for a periodic cell of spheres: contact detection, `law`, integrator."""
+    """YADE's engine list for a periodic cell of spheres: contact detection, `law`, integrator. No law has moments (see
+    material), so that the rotations at the contacts, a sixth of a step, need not be followed."""
     import yade.wrapper as y
 
     if law == "friction":
@@ -42,7 +43,7 @@ def engines(law, kn, kt, damping):
         )
     else:
         loop = y.InteractionLoop(
-            [y.Ig2_Sphere_Sphere_ScGeom6D()],
+            [y.Ig2_Sphere_Sphere_ScGeom6D(updateRotations=False)],
             [y.Ip2_CohFrictMat_CohFrictMat_CohFrictPhys(setCohesionNow=False, setCohesionOnNewContacts=False)],
             [y.Law2_ScGeom6D_CohFrictPhys_CohesionMoment()],
         )
