@@ -57,7 +57,7 @@ def engines(law, kn, kt, damping):
 
 
 def material(law, kn, kt, radius, density, friction):
-    """Material of a sphere of `radius` [m].
+    """Material of a sphere of `radius` [m]; the density is the scene's.
 
     YADE's kn = 2 E1 r1 E2 r2 / (E1 r1 + E2 r2), so E = kn/r keeps kn the same for every pair; its "poisson" is kt/kn.
     """
@@ -142,7 +142,7 @@ def run(O, steps, new_adhesion):
 
 
 def resting_time_step(O):
-    """Time step [s] in which the contact forces of the scene are found again without a slip: none, so that they are the
+    """Time step in which the contact forces of the scene are found again without a slip: none, so that they are the
     same to the bit; a billionth of O.dt for laws that may divide by it (Hertz-Mindlin's does, and answers nan)."""
     loop = next(e for e in O.engines if type(e).__name__ == "InteractionLoop")
     laws = {type(f).__name__ for f in loop.lawDispatcher.functors}

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 import contact_laws
+import unit_of_time
 
 DEFAULTS = {
     "spheres": 100,
@@ -40,6 +41,9 @@ def prepare(O, spec):
     Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
     """
     p = _checked({**DEFAULTS, **spec})
+    unit = unit_of_time.suited(p["confining_stress"], p["density"], p["spheres"])
+    unit_of_time.note(O, unit)
+    p["density"] = unit.scene_density(p["density"])  # all times and rates of the scene follow from it
     rng = np.random.default_rng(p["seed"])
     sigma, a, law = p["confining_stress"], p["mean_diameter"], p["contact_law"]
     kn, f_c = p["kappa"] * sigma * a, p["cohesion"] * sigma * a * a

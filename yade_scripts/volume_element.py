@@ -13,6 +13,7 @@ import contact_laws
 import contact_loop
 import packing
 import probing
+import unit_of_time
 import user_scenes
 import yade_modules
 from time_step import follow_network, set_time_step
@@ -43,6 +44,7 @@ class _Grains:
     solid_volume: float  # [m^3]
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
+    unit: unit_of_time.UnitOfTime  # of the scene
     clumped: bool
     states: list  # YADE's objects with positions and rotations
     new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
@@ -77,6 +79,7 @@ class Engine:
         manifest.update(self._geometry(grains), **self._contact_network(grains))
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
+        manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
@@ -133,7 +136,7 @@ class Engine:
         self._select(ve)
         L = np.asarray(velocity_gradient, dtype=float).reshape(3, 3)
         started = time.perf_counter()
-        self.O.cell.velGrad = self._Matrix3(*L.ravel())
+        self.O.cell.velGrad = self._Matrix3(*self._grains[ve].unit.scene_rate(L).ravel())
         before = time.perf_counter()
         try:
             contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
@@ -163,7 +166,7 @@ class Engine:
             trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
         values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
         values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
-        values["time_step"] = self.O.dt
+        values["time_step"] = grains.unit.seconds(self.O.dt)
         values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
         values["mean_rotation"] = _mean_rotation(grains.states)
         values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
@@ -212,7 +215,7 @@ class Engine:
         """The numbers of protocol.py's info()."""
         pressure = -np.trace(self._love_weber()) / 3
         return {
-            "time_step": self.O.dt,
+            "time_step": grains.unit.seconds(self.O.dt),
             "time_scale": _time_scale(grains, pressure),
             "volume": self.O.cell.volume,
             "spheres": grains.count,
@@ -246,13 +249,16 @@ class Engine:
 def _grains(O):
     """Clumps count as one grain of the mass that YADE gives them; the mean diameter is that of the spheres."""
     radius = np.array([getattr(b.shape, "radius", 0.0) for b in O.bodies])
-    density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
+    unit = unit_of_time.of(O)
+    scene_density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
     grains = [b for b in O.bodies if not b.isClumpMember]
-    solid = sum(b.state.mass for b in grains) / density
+    solid = sum(b.state.mass for b in grains) / scene_density
+    density = unit.density(scene_density)
     clumped = any(b.isClump for b in O.bodies)
     states = [b.state for b in O.bodies]
     new_adhesion = contact_laws.adhesion_of_new_contacts(O)
-    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, clumped, states, new_adhesion)
+    diameter = 2 * float(radius[radius > 0].mean())
+    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion)
 
 
 def _mean_rotation(states):
