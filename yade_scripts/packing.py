@@ -120,8 +120,8 @@ def _random_positions(rng, radii, side):
 
 
 def _along_mortons_curve(x):
-    """Order (n,) of points x (n, 3) in the unit cube along Morton's curve (1966): spheres that touch one another later have
-    near numbers, and so lie near to one another in memory."""
+    """Order (n,) of points x (n, 3) in the unit cube along Morton's curve (1966): spheres that touch one another later
+    have near numbers, and so lie near to one another in memory."""
     cells = (x * 2**MORTON_BITS).astype(np.int64)
     code = np.zeros(len(x), dtype=np.int64)
     for bit in range(MORTON_BITS):

@@ -113,6 +113,7 @@ class Engine:
         without = contact_laws.sliding_without_normal_force(O.interactions)
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
+        contact_laws.note_restored(O)
         self._to_forces()
         contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step

@@ -4,6 +4,7 @@ import unittest
 
 import numpy as np
 
+import contact_laws
 import contact_loop
 from volume_element import LOOK_EVERY
 
@@ -96,6 +97,25 @@ class States(unittest.TestCase):
                 engine().deform(v, L, 30)
             a, b = measure(ve)[0], measure(other)[0]
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
+
+    def test_contacts_become_adhesive_in_the_same_steps_however_often_a_state_is_restored(self):
+        spec = {**ADHESIVE, "new_contacts": "adhesive", "compaction_friction": 0.5}
+        one, other = element(spec), element(spec)
+        L = rate(one, 2e-2, BIAXIAL)
+        sticking = lambda ve: {(i.id1, i.id2) for i in select(ve).interactions if i.phys.normalAdhesion > 0}
+        before = sticking(one)
+        for steps in 6 * (1, 3, 1, 2, 1, 1, 0, 0, 0, 0, 0, 1, 7):
+            for ve in (one, other) if steps else ():
+                engine().deform(ve, L, steps)
+            engine().replace(other, engine().save(other))
+            self.assertEqual(*(contact_laws.steps_made(select(ve)) for ve in (one, other)))
+            self.assertEqual(sticking(one), sticking(other))
+        self.assertEqual(select(other).iter - select(one).iter, 6 * 13)
+        late = sticking(one) - before
+        print(f"{len(late)} contacts of {len(before)} formed and became adhesive on the way")
+        self.assertGreater(len(late), 5)
+        a, b = measure(one)[0], measure(other)[0]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
 
     def test_a_removed_element_leaves_its_place_and_the_others_alone(self):
         keep, gone = element(FRICTION), element(FRICTION)
