@@ -223,6 +223,12 @@ void PythonVolumeElements::commit() {
   begin_step();
 }
 
+std::vector<PointReport> PythonVolumeElements::reports() const {
+  std::vector<PointReport> reports(size());
+  for (std::size_t i = 0; i < size(); ++i) reports[i].values = worker_.slot(i).report;
+  return reports;
+}
+
 SavedStates PythonVolumeElements::save() {
   drop_trial();
   SavedStates states;

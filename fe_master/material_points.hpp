@@ -86,10 +86,16 @@ class MaterialPoints {
   virtual std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) = 0;
   /// Adopt the last trial as the committed state.
   virtual void commit() = 0;
+  /// After a commit: the complete reports of the committed state; none where Response::report was complete already. A
+  /// trial of volume elements leaves NaN in what does not judge or count it, see complete_report of protocol.py.
+  virtual std::vector<PointReport> reports() const { return {}; }
   /// Committed states; the points themselves go on from exactly what was saved (bit-equal restart).
   virtual SavedStates save() = 0;
   /// Replace the committed states by saved ones (size() of them).
   virtual void load(const SavedStates& states) = 0;
 };
+
+/// Commits the last trial and completes the reports of its responses.
+void commit(MaterialPoints& points, std::span<Response> responses);
 
 }  // namespace femxdem

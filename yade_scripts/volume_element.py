@@ -61,7 +61,7 @@ class Engine:
         from yade.utils import Matrix3
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
-        self.report_fields = list(report_fields)
+        self._place = {name: k for k, name in enumerate(report_fields)}
         self._free, self._trial, self._grains = [], {}, {}  # scene 0 is where templates are made
 
     def versions(self):
@@ -76,7 +76,7 @@ class Engine:
         manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
         self._to_forces()
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._contact_network(grains))
+        manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
@@ -162,20 +162,32 @@ class Engine:
         s = self._love_weber()
         out_stress[:] = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
-        values = self._contact_network(grains)
-        if trial.since_look >= LOOK_EVERY:
-            trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
-        values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
+        values = self._equilibrium(grains)
         values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         values["time_step"] = grains.unit.seconds(self.O.dt)
         values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
-        values["mean_rotation"] = _mean_rotation(grains.states)
         values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
         values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
+        values["seconds"] = trial.seconds + time.perf_counter() - started
+        out_report[:] = math.nan
+        self._fill(out_report, values)
+
+    def complete_report(self, ve, out_report):
+        self._select(ve)
+        trial, grains = self._trial[ve], self._grains[ve]
+        values = self._contact_network()
         for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
             values["fabric_" + name] = f
-        values["seconds"] = trial.seconds + time.perf_counter() - started
-        out_report[:] = [values.get(name, 0.0) for name in self.report_fields]
+        values["mean_rotation"] = _mean_rotation(grains.states)
+        if trial.since_look >= LOOK_EVERY:
+            trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
+        values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
+        self._fill(out_report, values)
+
+    def _fill(self, out_report, values):
+        for name, value in values.items():
+            if name in self._place:
+                out_report[self._place[name]] = value
 
     def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)
@@ -224,19 +236,21 @@ class Engine:
             "mean_stress": float(pressure),
         }
 
-    def _contact_network(self, grains):
-        """What a report says of the contacts, as far as YADE counts it in bulk."""
-        u = self._utils
-        per_body = np.array(u.numIntrsOfEachBody())
-        backbone = per_body[per_body > 1]
-        F = np.array(u.fabricTensor()[0]).reshape(3, 3)
+    def _equilibrium(self, grains):
+        """What a trial is judged by."""
         m = self.O.interactions.countReal()
+        unbalanced = self._utils.unbalancedForce()
+        return {"contacts": m, "coordination": 2 * m / grains.count, "unbalanced_force": unbalanced}
+
+    def _contact_network(self):
+        """What a report says of the contacts beside it, as far as YADE counts it in bulk."""
+        per_body = np.array(self._utils.numIntrsOfEachBody())
+        backbone = per_body[per_body > 1]
+        F = np.array(self._utils.fabricTensor()[0]).reshape(3, 3)
+        some = self.O.interactions.countReal() > 0
         return {
-            "contacts": m,
-            "coordination": 2 * m / grains.count,
             "coordination_backbone": float(backbone.mean()) if len(backbone) else 0.0,
-            "fabric": [F[0, 0], F[1, 1], F[2, 2], F[0, 1], F[1, 2], F[2, 0]] if m else [0.0] * 6,
-            "unbalanced_force": u.unbalancedForce(),
+            "fabric": [F[0, 0], F[1, 1], F[2, 2], F[0, 1], F[1, 2], F[2, 0]] if some else [0.0] * 6,
         }
 
     def _contact_states(self, grains):

@@ -8,7 +8,7 @@ import contact_laws
 import contact_loop
 from volume_element import LOOK_EVERY
 
-from cells import ADHESIVE, FRICTION, element, engine, measure, rate, select, template
+from cells import ADHESIVE, FIELDS, FRICTION, element, engine, measure, rate, select, template
 
 BIAXIAL = [[0.6, 0.1, 0.0], [0.1, -1.0, 0.05], [0.0, 0.05, 0.0]]
 
@@ -150,6 +150,21 @@ class Report(unittest.TestCase):
         self.assertEqual(r["coordination_backbone"], per_grain[per_grain > 1].mean())
         self.assertEqual(r["coordination"], per_grain.sum() / len(select(ve).bodies))
         self.assertAlmostEqual(time_scale, 1e-3 * np.sqrt(2600 / 1e5), delta=2e-3 * time_scale)
+
+    def test_a_trial_reports_what_judges_and_counts_it_and_a_commit_the_rest(self):
+        ve = element(ADHESIVE)
+        engine().deform(ve, rate(ve, 4e-3, BIAXIAL), 10)
+        report = np.full(len(FIELDS), -1.0)
+        engine().measure(ve, np.empty(9), report, np.empty(9))
+        of_trial = dict(zip(FIELDS, report))
+        engine().complete_report(ve, report)
+        complete = dict(zip(FIELDS, report))
+        left = {name for name in FIELDS if np.isnan(of_trial[name])}
+        costly = {"coordination_backbone", "mean_rotation", "sliding_contacts", "adhesive_contacts"}
+        self.assertEqual(left, costly | {name for name in FIELDS if name.startswith("fabric")})
+        for name in FIELDS:
+            self.assertTrue(np.isfinite(complete[name]), name)
+            self.assertTrue(name in left or complete[name] == of_trial[name], name)
 
     def test_contacts_are_looked_at_after_so_many_steps(self):
         ve = element(FRICTION)
