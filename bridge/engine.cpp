@@ -109,6 +109,10 @@ void Engine::measure(int ve, Slot& slot) {
   in_python([&] { engine_.attr("measure")(ve, view(slot.stress), view(slot.report), view(slot.stretch)); });
 }
 
+void Engine::complete_report(int ve, Slot& slot) {
+  in_python([&] { engine_.attr("complete_report")(ve, view(slot.report)); });
+}
+
 void Engine::stiffness(int ve, Slot& slot, bool relaxed) {
   in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness), relaxed); });
 }

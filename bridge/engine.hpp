@@ -30,8 +30,10 @@ class Engine {
   VeInfo info(int ve);
   /// Holds the slot's velocity gradient for its number of steps.
   void deform(int ve, Slot& slot);
-  /// Stress, report and stretch into the slot.
+  /// Stress, stretch and what judges a trial of the report into the slot.
   void measure(int ve, Slot& slot);
+  /// The rest of the report that measure has begun.
+  void complete_report(int ve, Slot& slot);
   void stiffness(int ve, Slot& slot, bool relaxed);
   void follow_network(int ve);
 

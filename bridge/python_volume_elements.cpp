@@ -158,6 +158,12 @@ std::string PythonVolumeElements::save_one(std::size_t index) {
   return encode({EngineKind::yade, points_[index].reference_time_scale, std::move(bytes)});
 }
 
+std::vector<PointReport> PythonVolumeElements::reports() const {
+  std::vector<PointReport> reports(size());
+  for (std::size_t i = 0; i < size(); ++i) reports[i].values = worker_.slot(i).report;
+  return reports;
+}
+
 SavedStates PythonVolumeElements::save() {
   drop_trial();
   SavedStates states;

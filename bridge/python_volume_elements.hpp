@@ -45,6 +45,7 @@ class PythonVolumeElements : public LocalPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   /// Throws std::logic_error without a trial or after a trial that failed.
   void commit() override;
+  std::vector<PointReport> reports() const override;
   SavedStates save() override;
   void load(const SavedStates& states) override;
 

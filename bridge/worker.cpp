@@ -131,6 +131,7 @@ void Worker::load(const Message& message) {
 void Worker::refresh(std::size_t index) {
   Slot& slot = batch_.slots[index];
   engine_.measure(ves_[index], slot);
+  engine_.complete_report(ves_[index], slot);
   slot.info = engine_.info(ves_[index]);
 }
 
@@ -195,6 +196,7 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
 }
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
+  complete_reports();
   follow_networks();
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
@@ -209,6 +211,7 @@ void Worker::commit_in_process(const Message& message) {
   if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
   trial_in_process_ = false;
   snapshot_.clear();
+  complete_reports();
   follow_networks();
   reply(message, ReplyKind::done, getpid());
 }
@@ -224,6 +227,10 @@ void Worker::take_snapshot() {
     snapshot_.push_back(engine_.save(ve));
     engine_.replace(ve, snapshot_.back());
   }
+}
+
+void Worker::complete_reports() noexcept {
+  for (std::size_t i = 0; i < ves_.size(); ++i) engine_.complete_report(ves_[i], batch_.slots[i]);
 }
 
 void Worker::follow_networks() noexcept {

@@ -43,7 +43,9 @@ class Worker {
   void deform_all(std::int64_t stiffness);
   void deform_one(std::size_t index, std::int64_t stiffness);
   void take_snapshot();
-  /// An engine that fails here ends the process: the rank repeats the trial once, from the committed state.
+  /// An engine that fails in one of these two ends the process: the rank repeats the trial once, from the committed
+  /// state.
+  void complete_reports() noexcept;
   void follow_networks() noexcept;
   void refresh(std::size_t index);
 

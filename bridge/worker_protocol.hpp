@@ -83,12 +83,12 @@ struct Slot {
   std::int64_t steps = 0;
   // from the worker
   Outcome outcome = Outcome::none;
-  std::array<double, 9> stress{};  ///< Cauchy [Pa], tension positive
-  std::array<double, kReportFields.size()> report{};
-  std::array<double, 9> stretch{};     ///< deformation gradient of the cell from the reference
-  std::array<double, 81> stiffness{};  ///< [Pa], when asked for
-  VeInfo info;                         ///< when it was added, saved or loaded; the time step as it is
-  std::array<char, 400> sentence{};    ///< why it failed, zero-terminated
+  std::array<double, 9> stress{};                     ///< Cauchy [Pa], tension positive
+  std::array<double, kReportFields.size()> report{};  ///< complete once it is committed, added, saved or loaded
+  std::array<double, 9> stretch{};                    ///< deformation gradient of the cell from the reference
+  std::array<double, 81> stiffness{};                 ///< [Pa], when asked for
+  VeInfo info;                                        ///< when it was added, saved or loaded; the time step as it is
+  std::array<char, 400> sentence{};                   ///< why it failed, zero-terminated
 };
 
 inline constexpr std::int64_t kNone = -1;

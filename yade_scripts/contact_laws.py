@@ -25,12 +25,16 @@ FINITE_WITHOUT_TIME = {
     "Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM",
 }
 ADHESION_TAG = "femxdem_adhesion_of_new_contacts"
+LOOKS_TAG = "femxdem_looks_for_new_contacts"
 STIFFNESS_TAG = "femxdem_constant_stiffness"
 SAFETY_TAG = "femxdem_time_step_safety"
 
 
 def engines(law, kn, kt, damping):
-    """YADE's engine list for a periodic cell of spheres: contact detection, `law`, integrator."""
+    """YADE's engine list for a periodic cell of spheres: contact detection, `law`, integrator. No law has moments (see
+    material), so that the rotations at the contacts, a sixth of a step, need not be followed. Forces are summed in
+    whatever order YADE holds the contacts: in the order of the spheres' numbers (loopOnSortedInteractions) a step takes
+    three times as long."""
     import yade.wrapper as y
 
     if law == "friction":
@@ -42,7 +46,7 @@ def engines(law, kn, kt, damping):
         )
     else:
         loop = y.InteractionLoop(
-            [y.Ig2_Sphere_Sphere_ScGeom6D()],
+            [y.Ig2_Sphere_Sphere_ScGeom6D(updateRotations=False)],
             [y.Ip2_CohFrictMat_CohFrictMat_CohFrictPhys(setCohesionNow=False, setCohesionOnNewContacts=False)],
             [y.Law2_ScGeom6D_CohFrictPhys_CohesionMoment()],
         )
@@ -55,7 +59,7 @@ def engines(law, kn, kt, damping):
 
 
 def material(law, kn, kt, radius, density, friction):
-    """Material of a sphere of `radius` [m].
+    """Material of a sphere of `radius` [m]; the density is the scene's.
 
     YADE's kn = 2 E1 r1 E2 r2 / (E1 r1 + E2 r2), so E = kn/r keeps kn the same for every pair; its "poisson" is kt/kn.
     """
@@ -102,11 +106,30 @@ def constant_stiffness(O):
 def make_new_contacts_adhesive(O, f_c, friction):
     """Notes in the scene, with which it is saved, that contacts formed from now on get the adhesion f_c [N]."""
     _note(O, ADHESION_TAG, f_c, friction)
+    _note(O, LOOKS_TAG, 0, O.iter)
 
 
 def adhesion_of_new_contacts(O):
     """(f_c [N], friction) of the scene's note, or None."""
     return _noted(O, ADHESION_TAG)
+
+
+def note_restored(O):
+    """Notes in the scene that it has just been restored, which has added a step to YADE's count."""
+    if adhesion_of_new_contacts(O):
+        added, last = _looks(O)
+        _note(O, LOOKS_TAG, added + 1, last)
+
+
+def steps_made(O):
+    """DEM steps of the scene, without those that restoring it has added to YADE's count."""
+    return O.iter - _looks(O)[0]
+
+
+def _looks(O):
+    """Steps that restoring has added to YADE's count, and that count at the last look for new contacts."""
+    noted = _noted(O, LOOKS_TAG)
+    return (int(noted[0]), int(noted[1])) if noted else (0, O.iter - 2 * EVERY)
 
 
 def note_time_step_safety(O, safety):
@@ -129,18 +152,25 @@ def _noted(O, tag):
 
 
 def run(O, steps, new_adhesion):
-    """`steps` DEM steps. With new_adhesion = (f_c, friction), contacts that formed since become adhesive at every step
-    number divisible by EVERY: by the scene's own count, so that no split and no restart moves it."""
+    """`steps` DEM steps. With new_adhesion = (f_c, friction), the contacts that have formed since the last look become
+    adhesive at every step number divisible by EVERY: by the scene's own count (steps_made), so that no split and no
+    restart moves it."""
     step = O.step
+    if not new_adhesion:
+        for _ in range(steps):
+            step()
+        return
+    added, last = _looks(O)
     for _ in range(steps):
         step()
-        if new_adhesion and O.iter % EVERY == 0:
-            since = O.iter - 2 * EVERY
-            add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal > since], *new_adhesion)
+        if (O.iter - added) % EVERY == 0:
+            add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
+            last = O.iter
+    _note(O, LOOKS_TAG, added, last)
 
 
 def resting_time_step(O):
-    """Time step [s] in which the contact forces of the scene are found again without a slip: none, so that they are the
+    """Time step in which the contact forces of the scene are found again without a slip: none, so that they are the
     same to the bit; a billionth of O.dt for laws that may divide by it (Hertz-Mindlin's does, and answers nan)."""
     loop = next(e for e in O.engines if type(e).__name__ == "InteractionLoop")
     laws = {type(f).__name__ for f in loop.lawDispatcher.functors}

@@ -5,7 +5,10 @@ import math
 import numpy as np
 
 import contact_laws
+import unit_of_time
 
+LOOSE = 0.3  # solid fraction of the spheres before they touch
+MORTON_BITS = 10  # of each coordinate
 COMPACTION_DAMPING = 0.3
 STRESS_TOLERANCE = 5e-4  # of sigma_0, each component
 UNBALANCED_TOLERANCE = 5e-5
@@ -22,14 +25,21 @@ def prepare(O, spec):
     are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
     Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
     """
-    p = _checked(spec)
+    p = _checked(dict(spec))
+    unit = unit_of_time.suited(p["confining_stress"], p["density"], p["spheres"])
+    unit_of_time.note(O, unit)
+    p["density"] = unit.scene_density(p["density"])  # all times and rates of the scene follow from it
     rng = np.random.default_rng(p["seed"])
     sigma, a, law = p["confining_stress"], p["mean_diameter"], p["contact_law"]
     kn, f_c = p["kappa"] * sigma * a, p["cohesion"] * sigma * a * a
     diameters = rng.uniform(1.0, p["size_ratio"], p["spheres"])
     radii = 0.5 * a * diameters / diameters.mean()
     shrink = 0.5 * f_c / kn if law == "adhesive" else 0.0
-    _loose_cell(O, p, kn, radii, radii - shrink, rng)
+    side = (4 / 3 * math.pi * (radii**3).sum() / LOOSE) ** (1 / 3)
+    positions = _random_positions(rng, radii, side)
+    numbers = _along_mortons_curve(positions / side)
+    positions, radii = positions[numbers], radii[numbers]
+    _loose_cell(O, p, kn, side, positions, radii - shrink)
     stiffest = kn * max(1, 1 / p["stiffness_ratio"])  # of normal and tangential
     O.dt = 0.2 * math.sqrt(O.bodies[int(np.argmin(radii))].state.mass / stiffest)
     servo = _Servo(O, p, kn)
@@ -45,6 +55,7 @@ def prepare(O, spec):
     if p["new_contacts"] == "adhesive":
         contact_laws.make_new_contacts_adhesive(O, f_c, p["friction"])
     O.engines[-1].damping = p["damping"]
+    O.interactions.serializeSorted = True  # contacts come back from a saved scene in the order of the spheres
 
 
 def _checked(p):
@@ -63,17 +74,16 @@ def _checked(p):
     return p
 
 
-def _loose_cell(O, p, kn, radii, small_radii, rng):
-    """Spheres at random, without contact, at a solid fraction of 0.3, in a cube that fits them."""
+def _loose_cell(O, p, kn, side, positions, radii):
+    """Spheres at their positions (n, 3) [m], without contact, in a periodic cube."""
     from yade.utils import Matrix3, sphere
 
-    side = (4 / 3 * math.pi * (radii**3).sum() / 0.3) ** (1 / 3)
     O.periodic = True
     O.cell.hSize = Matrix3(side, 0, 0, 0, side, 0, 0, 0, side)
     law, kt = p["contact_law"], kn / p["stiffness_ratio"]
     O.engines = contact_laws.engines(law, kn, kt, COMPACTION_DAMPING)
     contact_laws.note_constant_stiffness(O, kn, kt)
-    for x, r in zip(_random_positions(rng, radii, side), small_radii):
+    for x, r in zip(positions, radii):
         mat = contact_laws.material(law, kn, kt, r, p["density"], p["compaction_friction"])
         O.bodies.append(sphere(tuple(x), r, material=mat))
 
@@ -92,6 +102,17 @@ def _random_positions(rng, radii, side):
         positions[i] = x
         placed = np.append(placed, i)
     return positions
+
+
+def _along_mortons_curve(x):
+    """Order (n,) of points x (n, 3) in the unit cube along Morton's curve (1966): spheres that touch one another later
+    have near numbers, and so lie near to one another in memory."""
+    cells = (x * 2**MORTON_BITS).astype(np.int64)
+    code = np.zeros(len(x), dtype=np.int64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            code |= (cells[:, axis] >> bit & 1) << 3 * bit + axis
+    return np.argsort(code, kind="stable")
 
 
 def _set_radii(O, radii, kn, density):

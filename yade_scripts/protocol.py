@@ -18,9 +18,12 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's
                                        time_step: the cell ends at (I + L time_step)^steps times where it was; stress
                                        and report belong to exactly that end
-    measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report; (9,) the cell's
-                                       deformation gradient from the reference (adopted) state. sliding_contacts and
-                                       adhesive_contacts may be as old as 200 DEM steps, the rest is of now
+    measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report: what judges and
+                                       counts a trial, NaN where it costs more; (9,) the cell's deformation gradient
+                                       from the reference (adopted) state
+    complete_report(ve, out_report)    the entries of the report that measure has left NaN, of the same moment; called
+                                       for states that are committed. sliding_contacts and adhesive_contacts may be as
+                                       old as 200 DEM steps, the rest is of now
     follow_network(ve)                 the time step of info() becomes what the state of now asks for; called between
                                        load steps, never within one
     stiffness(ve, out_stiffness, relaxed)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised
@@ -122,5 +125,8 @@ class DummyEngine:
         stress = np.einsum("ijkl,kl->ij", C.reshape(3, 3, 3, 3), strain) - cell["confining_stress"] * np.eye(3)
         out_stress[:] = stress.ravel()
         out_stretch[:] = cell["F"].ravel()
-        values = {"dem_steps": cell["steps"], "time_step": cell["time_step"], "contacts": 1}
+        values = {"dem_steps": cell["steps"], "time_step": cell["time_step"], "contacts": 1, "mean_rotation": np.nan}
         out_report[:] = [values.get(name, 0.0) for name in self.report_fields]
+
+    def complete_report(self, ve, out_report):
+        out_report[self.report_fields.index("mean_rotation")] = np.linalg.norm(self.cells[ve]["F"] - np.eye(3))

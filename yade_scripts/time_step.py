@@ -1,4 +1,4 @@
-"""The largest stable time step of a volume element, from its contact network."""
+"""The largest stable time step of a volume element, from its contact network; all times are in the scene's unit."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ KEPT = 0.6, 1.1  # time step over the safe one: within these bounds it is left a
 def set_time_step(O, own, safety):
     """Gives the scene its time step and returns where it comes from: `safety` times the critical step of the contact
     network; for clumps and contacts without kn and ks, whose network is not known here, the smaller of the scene's
-    `own` step [s] and `safety` times YADE's estimate by P waves."""
+    `own` step and `safety` times YADE's estimate by P waves."""
     from yade.utils import PWaveTimeStep
 
     c = contacts(O)
@@ -38,7 +38,7 @@ def follow_network(O):
 
 
 def critical_time_step(O, c):
-    """2/omega_max [s] of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin.
+    """2/omega_max of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin.
 
     Power iteration on M^-1 K; K holds kn along the normal and kt across it, acting on
     u_j - u_i - (r_i theta_i + r_j theta_j) x n. Its estimate of omega_max comes from below, within some per cent.
@@ -77,7 +77,7 @@ def _sums(places, rows, count):
 
 
 def _masses(O):
-    """Mass [kg], moment of inertia [kg m^2] and radius [m] by the number of the body; one that has been erased moves nothing."""
+    """Mass, moment of inertia and radius [m] by the number of the body; one that has been erased moves nothing."""
     numbers = np.tile([[1.0], [1.0], [0.0]], len(O.bodies))
     for b in O.bodies:
         numbers[:, b.id] = b.state.mass, b.state.inertia[0], b.shape.radius

@@ -13,6 +13,7 @@ import contact_laws
 import contact_loop
 import packing
 import probing
+import unit_of_time
 import user_scenes
 import yade_modules
 from time_step import follow_network, set_time_step
@@ -43,6 +44,7 @@ class _Grains:
     solid_volume: float  # [m^3]
     mean_diameter: float  # [m]
     density: float  # [kg/m^3]
+    unit: unit_of_time.UnitOfTime  # of the scene
     clumped: bool
     states: list  # YADE's objects with positions and rotations
     new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
@@ -59,7 +61,7 @@ class Engine:
         from yade.utils import Matrix3
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
-        self.report_fields = list(report_fields)
+        self._place = {name: k for k, name in enumerate(report_fields)}
         self._free, self._trial, self._grains = [], {}, {}  # scene 0 is where templates are made
 
     def versions(self):
@@ -74,9 +76,10 @@ class Engine:
         manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
         self._to_forces()
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._contact_network(grains))
+        manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
+        manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
@@ -110,6 +113,7 @@ class Engine:
         without = contact_laws.sliding_without_normal_force(O.interactions)
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
+        contact_laws.note_restored(O)
         self._to_forces()
         contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
@@ -133,7 +137,7 @@ class Engine:
         self._select(ve)
         L = np.asarray(velocity_gradient, dtype=float).reshape(3, 3)
         started = time.perf_counter()
-        self.O.cell.velGrad = self._Matrix3(*L.ravel())
+        self.O.cell.velGrad = self._Matrix3(*self._grains[ve].unit.scene_rate(L).ravel())
         before = time.perf_counter()
         try:
             contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
@@ -158,20 +162,32 @@ class Engine:
         s = self._love_weber()
         out_stress[:] = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
-        values = self._contact_network(grains)
+        values = self._equilibrium(grains)
+        values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
+        values["time_step"] = grains.unit.seconds(self.O.dt)
+        values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
+        values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
+        values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
+        values["seconds"] = trial.seconds + time.perf_counter() - started
+        out_report[:] = math.nan
+        self._fill(out_report, values)
+
+    def complete_report(self, ve, out_report):
+        self._select(ve)
+        trial, grains = self._trial[ve], self._grains[ve]
+        values = self._contact_network()
+        for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
+            values["fabric_" + name] = f
+        values["mean_rotation"] = _mean_rotation(grains.states)
         if trial.since_look >= LOOK_EVERY:
             trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
         values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
-        values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
-        values["time_step"] = self.O.dt
-        values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
-        values["mean_rotation"] = _mean_rotation(grains.states)
-        values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
-        values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
-        for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
-            values["fabric_" + name] = f
-        values["seconds"] = trial.seconds + time.perf_counter() - started
-        out_report[:] = [values.get(name, 0.0) for name in self.report_fields]
+        self._fill(out_report, values)
+
+    def _fill(self, out_report, values):
+        for name, value in values.items():
+            if name in self._place:
+                out_report[self._place[name]] = value
 
     def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)
@@ -212,7 +228,7 @@ class Engine:
         """The numbers of protocol.py's info()."""
         pressure = -np.trace(self._love_weber()) / 3
         return {
-            "time_step": self.O.dt,
+            "time_step": grains.unit.seconds(self.O.dt),
             "time_scale": _time_scale(grains, pressure),
             "volume": self.O.cell.volume,
             "spheres": grains.count,
@@ -220,19 +236,21 @@ class Engine:
             "mean_stress": float(pressure),
         }
 
-    def _contact_network(self, grains):
-        """What a report says of the contacts, as far as YADE counts it in bulk."""
-        u = self._utils
-        per_body = np.array(u.numIntrsOfEachBody())
-        backbone = per_body[per_body > 1]
-        F = np.array(u.fabricTensor()[0]).reshape(3, 3)
+    def _equilibrium(self, grains):
+        """What a trial is judged by."""
         m = self.O.interactions.countReal()
+        unbalanced = self._utils.unbalancedForce()
+        return {"contacts": m, "coordination": 2 * m / grains.count, "unbalanced_force": unbalanced}
+
+    def _contact_network(self):
+        """What a report says of the contacts beside it, as far as YADE counts it in bulk."""
+        per_body = np.array(self._utils.numIntrsOfEachBody())
+        backbone = per_body[per_body > 1]
+        F = np.array(self._utils.fabricTensor()[0]).reshape(3, 3)
+        some = self.O.interactions.countReal() > 0
         return {
-            "contacts": m,
-            "coordination": 2 * m / grains.count,
             "coordination_backbone": float(backbone.mean()) if len(backbone) else 0.0,
-            "fabric": [F[0, 0], F[1, 1], F[2, 2], F[0, 1], F[1, 2], F[2, 0]] if m else [0.0] * 6,
-            "unbalanced_force": u.unbalancedForce(),
+            "fabric": [F[0, 0], F[1, 1], F[2, 2], F[0, 1], F[1, 2], F[2, 0]] if some else [0.0] * 6,
         }
 
     def _contact_states(self, grains):
@@ -246,13 +264,16 @@ class Engine:
 def _grains(O):
     """Clumps count as one grain of the mass that YADE gives them; the mean diameter is that of the spheres."""
     radius = np.array([getattr(b.shape, "radius", 0.0) for b in O.bodies])
-    density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
+    unit = unit_of_time.of(O)
+    scene_density = float(np.mean([b.mat.density for b in O.bodies if not b.isClump]))
     grains = [b for b in O.bodies if not b.isClumpMember]
-    solid = sum(b.state.mass for b in grains) / density
+    solid = sum(b.state.mass for b in grains) / scene_density
+    density = unit.density(scene_density)
     clumped = any(b.isClump for b in O.bodies)
     states = [b.state for b in O.bodies]
     new_adhesion = contact_laws.adhesion_of_new_contacts(O)
-    return _Grains(len(grains), radius, solid, 2 * float(radius[radius > 0].mean()), density, clumped, states, new_adhesion)
+    diameter = 2 * float(radius[radius > 0].mean())
+    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion)
 
 
 def _mean_rotation(states):

@@ -18,4 +18,10 @@ double& PointReport::operator[](std::string_view field) { return values[report_i
 
 double PointReport::operator[](std::string_view field) const { return values[report_index(field)]; }
 
+void commit(MaterialPoints& points, std::span<Response> responses) {
+  points.commit();
+  const std::vector<PointReport> reports = points.reports();
+  for (std::size_t i = 0; i < reports.size(); ++i) responses[i].report = reports[i];
+}
+
 }  // namespace femxdem

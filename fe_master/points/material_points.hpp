@@ -87,6 +87,9 @@ class MaterialPoints {
   virtual std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) = 0;
   /// Adopt the last trial as the committed state.
   virtual void commit() = 0;
+  /// After a commit: the complete reports of the committed state; none where Response::report was complete already. A
+  /// trial of volume elements leaves NaN in what does not judge or count it, see complete_report of protocol.py.
+  virtual std::vector<PointReport> reports() const { return {}; }
   /// Committed states; the points themselves go on from exactly what was saved (bit-equal restart).
   virtual SavedStates save() = 0;
   /// Replace the committed states by saved ones (size() of them).
@@ -109,5 +112,8 @@ class LocalPoints : public MaterialPoints {
   /// Largest memory so far of what stands behind the points [byte].
   virtual std::uint64_t peak_memory() const = 0;
 };
+
+/// Commits the last trial and completes the reports of its responses.
+void commit(MaterialPoints& points, std::span<Response> responses);
 
 }  // namespace femxdem

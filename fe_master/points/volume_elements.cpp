@@ -122,6 +122,16 @@ std::string evaluate(LocalPoints& local, PacketReader input) {
   return output.take();
 }
 
+/// Output: the number of reports, 0 or one for each local point, and the reports.
+std::string commit(LocalPoints& local) {
+  local.commit();
+  const std::vector<PointReport> reports = local.reports();
+  PacketWriter output;
+  output.put(reports.size());
+  for (const PointReport& report : reports) output.put_doubles(report.values.data(), report.values.size());
+  return output.take();
+}
+
 std::string save(LocalPoints& local) {
   PacketWriter output;
   for (const std::string& state : local.save()) output.put(state);
@@ -146,8 +156,7 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local)
     case Order::evaluate:
       return evaluate(local, PacketReader(input));
     case Order::commit:
-      local.commit();
-      break;
+      return commit(local);
     case Order::save:
       return save(local);
     case Order::load:
@@ -273,7 +282,18 @@ void VolumeElements::count(const std::vector<Response>& responses, double second
   }
 }
 
-void VolumeElements::commit() { command(communicator_, Order::commit, {}, local_); }
+void VolumeElements::commit() {
+  const std::vector<std::string> answers = command(communicator_, Order::commit, {}, local_);
+  const auto points = points_of_ranks();
+  reports_.clear();
+  for (std::size_t rank = 0; rank < points.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    if (packet.get<std::size_t>() == 0) continue;
+    reports_.resize(size());
+    for (const std::size_t point : points[rank])
+      packet.get_doubles(reports_[point].values.data(), reports_[point].values.size());
+  }
+}
 
 SavedStates VolumeElements::save() {
   const std::vector<std::string> answers = command(communicator_, Order::save, {}, local_);

@@ -40,6 +40,7 @@ class VolumeElements : public MaterialPoints {
   void begin_step() override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
+  std::vector<PointReport> reports() const override { return reports_; }
   SavedStates save() override;
   void load(const SavedStates& states) override;
 
@@ -53,7 +54,8 @@ class VolumeElements : public MaterialPoints {
 
   MPI_Comm communicator_;
   LocalPoints& local_;
-  std::vector<int> owner_;  ///< rank of each point
+  std::vector<int> owner_;            ///< rank of each point
+  std::vector<PointReport> reports_;  ///< of the last commit
   FarmStatistics statistics_;
 };
 

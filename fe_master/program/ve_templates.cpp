@@ -21,10 +21,7 @@ std::string key_of(const VeParameters& ve, const std::string& specification, con
   for (const std::string& file : {ve.script, ve.scene}) {
     if (!file.empty()) key += read_file(file);
   }
-  for (const char* maker : {"packing.py", "contact_laws.py", "adoption.py", "time_step.py"}) {
-    key += read_file(fs::path(FEMXDEM_YADE_SCRIPTS) / maker);
-  }
-  return hash_text(key);
+  return hash_text(key + makers(FEMXDEM_YADE_SCRIPTS));
 }
 
 std::map<std::string, std::string> parse_strings(const std::string& json) {
@@ -35,6 +32,17 @@ std::map<std::string, std::string> parse_strings(const std::string& json) {
 }
 
 }  // namespace
+
+std::string makers(const fs::path& scripts) {
+  std::map<std::string, std::string> texts;  // in the order of their names
+  for (const fs::path& file : fs::directory_iterator(scripts)) {
+    const std::string name = file.filename();
+    if (file.extension() == ".py" && name != "protocol.py" && name != "inspect_ve.py") texts[name] = read_file(file);
+  }
+  std::string all;
+  for (const auto& [name, text] : texts) all += name + '\0' + text + '\0';
+  return all;
+}
 
 TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve) {
   const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);

@@ -19,6 +19,11 @@ struct TemplateFiles {
 };
 TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve);
 
+/// Names and texts of the scripts that decide what a volume element is prepared to: all of the folder, so that none is
+/// forgotten, but the contract with its dummy and the drawing of what has been prepared. A change in one of them, even
+/// where it decides nothing, costs a preparation.
+std::string makers(const std::filesystem::path& scripts);
+
 /// States of the volume elements that a case starts from, one per entry of `pool`: from the cache folder where they
 /// are, else prepared (or adopted from a scene or a user's script) and put there with their manifests.
 /// `say` gets one line for each.

@@ -65,7 +65,7 @@ NonlinearSolver::NonlinearSolver(Element& element, MaterialPoints& points, const
       last_external_change_(Eigen::VectorXd::Zero(element.unknowns())),
       operators_(parameters,
                  committed_.responses = undeformed(points, committed_.F = element.deformation(committed_.x))) {
-  points_.commit();
+  femxdem::commit(points_, committed_.responses);
   committed_.internal = assembler_.force(committed_.x, committed_.F, stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
 }
@@ -330,7 +330,7 @@ bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
 }
 
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
-  points_.commit();
+  femxdem::commit(points_, trial.responses);
   element_.commit(trial.x);
   last_external_change_ = trial.external - committed_.external;
   last_dt_ = dt;

@@ -94,6 +94,28 @@ TEST(PythonVolumeElements, ElasticStressOfTheDummyCell) {
   EXPECT_EQ(response.report["dem_steps"], 20);
 }
 
+/// The dummy's mean rotation stands for what costs too much to be reported by every trial: |F - I| of its cell.
+TEST(PythonVolumeElements, ReportsAreCompleteOnceTheyAreCommitted) {
+  for (const VolumeElementOptions& options : {VolumeElementOptions{}, serialised()}) {
+    Points three(kThree, dummy(), options);
+    for (const double strain : {1e-3, 2e-3}) {
+      Tensor2 F = Tensor2::Identity();
+      F(1, 1) += strain;
+      const std::vector<Tensor2> all{F, Tensor2::Identity(), F};
+      std::vector<Response> responses = three.points.evaluate(all, Operator::none);
+      const std::vector<Response> trial = responses;
+      for (const Response& r : trial) EXPECT_TRUE(std::isnan(r.report["mean_rotation"]));
+      commit(three.points, responses);
+      for (std::size_t i = 0; i < 3; ++i) {
+        PointReport report = trial[i].report;
+        report["mean_rotation"] = responses[i].report["mean_rotation"];
+        EXPECT_EQ(report.values, responses[i].report.values) << "only what was missing has changed";
+        EXPECT_NEAR(report["mean_rotation"], (all[i] - Tensor2::Identity()).norm(), 1e-12);
+      }
+    }
+  }
+}
+
 TEST(PythonVolumeElements, StepsAreFrozenWithinALoadStep) {
   Points one({kPlain});
   const auto steps = [&](double strain) {

@@ -54,6 +54,7 @@ TEST(VolumeElements, SameBitsAsInOnePlace) {
       farm.points->commit();
       reference.commit();
     }
+    EXPECT_TRUE(farm.points->reports().empty()) << "those of the trials are complete";
     EXPECT_EQ(farm.points->save(), reference.save());
   }
 }
@@ -70,6 +71,10 @@ TEST(VolumeElements, SameBitsWithWorkers) {
     expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
     farm.points->commit();
     reference.commit();
+    const std::vector<PointReport> reports = farm.points->reports();
+    ASSERT_EQ(reports.size(), kSeven.size());
+    for (std::size_t i = 0; i < reports.size(); ++i)
+      EXPECT_EQ(reports[i]["mean_rotation"], reference.reports()[i]["mean_rotation"]) << "point " << i;
   }
   EXPECT_GT(farm.points->peak_memory(), static_cast<std::uint64_t>(ranks()) << 20);
 }

@@ -61,6 +61,7 @@ class Script(Folder):
         self.assertEqual(m["dropped"], ["PeriTriaxController (triax)", "PyRunner"])
         self.assertEqual(m["kept"], list(adoption.KEPT))
         self.assertEqual(len(m["reset"]), 3)
+        self.assertEqual(m["scene_unit_of_time"], 1.0)
         ve = engine().add(made["state"])
         stress, _, F = measure(ve)
         np.testing.assert_allclose(np.diag(stress), -1e4, rtol=0.1)
@@ -120,6 +121,9 @@ class Scene(Folder):
             stress, _, F = measure(other)
             np.testing.assert_array_equal(F, np.eye(3))
             np.testing.assert_allclose(stress, measure(ve)[0], rtol=0, atol=1e-9 * 1e5)
+            for quantity in ("time_scale", "time_step"):  # [s], though a prepared scene counts in another unit
+                ratio = engine().info(other)[quantity] / engine().info(ve)[quantity]
+                self.assertAlmostEqual(ratio, 1, delta=1e-9 if quantity == "time_scale" else 0.05)
             self.assertIn("velocity gradient of the cell set to zero", made["manifest"]["reset"])
 
     def test_missing_and_broken_scenes(self):

@@ -58,9 +58,10 @@ def element(spec):
 
 
 def measure(ve):
-    """Stress (3, 3), report as a dict, deformation gradient (3, 3)."""
+    """Stress (3, 3), complete report as a dict, deformation gradient (3, 3)."""
     stress, report, stretch = np.full(9, np.nan), np.full(len(FIELDS), np.nan), np.full(9, np.nan)
     engine().measure(ve, stress, report, stretch)
+    engine().complete_report(ve, report)
     return stress.reshape(3, 3), dict(zip(FIELDS, report)), stretch.reshape(3, 3)
 
 

@@ -138,7 +138,7 @@ class OtherModes(unittest.TestCase):
                 contact_laws.make_new_contacts_adhesive(select(ve), f_c, 0.5)
                 ve = engine().add(engine().save(ve))
             L = rate(ve, 1e-2, [[0.5, 0, 0], [0, -1, 0], [0, 0, 0]])
-            engine().deform(ve, L, 60 * contact_laws.EVERY - select(ve).iter % contact_laws.EVERY)
+            engine().deform(ve, L, 60 * contact_laws.EVERY - contact_laws.steps_made(select(ve)) % contact_laws.EVERY)
             loop = select(ve).engines[2]
             functor, maker = loop.lawDispatcher.functors[0], loop.physDispatcher.functors[0]
             self.assertFalse(any(functor.dict()[mode] for mode in self.FUNCTOR))

@@ -4,10 +4,11 @@ import unittest
 
 import numpy as np
 
+import contact_laws
 import contact_loop
 from volume_element import LOOK_EVERY
 
-from cells import ADHESIVE, FRICTION, element, engine, measure, rate, select, template
+from cells import ADHESIVE, FIELDS, FRICTION, element, engine, measure, rate, select, template
 
 BIAXIAL = [[0.6, 0.1, 0.0], [0.1, -1.0, 0.05], [0.0, 0.05, 0.0]]
 
@@ -97,6 +98,25 @@ class States(unittest.TestCase):
             a, b = measure(ve)[0], measure(other)[0]
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
 
+    def test_contacts_become_adhesive_in_the_same_steps_however_often_a_state_is_restored(self):
+        spec = {**ADHESIVE, "new_contacts": "adhesive", "compaction_friction": 0.5}
+        one, other = element(spec), element(spec)
+        L = rate(one, 2e-2, BIAXIAL)
+        sticking = lambda ve: {(i.id1, i.id2) for i in select(ve).interactions if i.phys.normalAdhesion > 0}
+        before = sticking(one)
+        for steps in 6 * (1, 3, 1, 2, 1, 1, 0, 0, 0, 0, 0, 1, 7):
+            for ve in (one, other) if steps else ():
+                engine().deform(ve, L, steps)
+            engine().replace(other, engine().save(other))
+            self.assertEqual(*(contact_laws.steps_made(select(ve)) for ve in (one, other)))
+            self.assertEqual(sticking(one), sticking(other))
+        self.assertEqual(select(other).iter - select(one).iter, 6 * 13)
+        late = sticking(one) - before
+        print(f"{len(late)} contacts of {len(before)} formed and became adhesive on the way")
+        self.assertGreater(len(late), 5)
+        a, b = measure(one)[0], measure(other)[0]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(a).max())
+
     def test_a_removed_element_leaves_its_place_and_the_others_alone(self):
         keep, gone = element(FRICTION), element(FRICTION)
         before = measure(keep)[0]
@@ -130,6 +150,21 @@ class Report(unittest.TestCase):
         self.assertEqual(r["coordination_backbone"], per_grain[per_grain > 1].mean())
         self.assertEqual(r["coordination"], per_grain.sum() / len(select(ve).bodies))
         self.assertAlmostEqual(time_scale, 1e-3 * np.sqrt(2600 / 1e5), delta=2e-3 * time_scale)
+
+    def test_a_trial_reports_what_judges_and_counts_it_and_a_commit_the_rest(self):
+        ve = element(ADHESIVE)
+        engine().deform(ve, rate(ve, 4e-3, BIAXIAL), 10)
+        report = np.full(len(FIELDS), -1.0)
+        engine().measure(ve, np.empty(9), report, np.empty(9))
+        of_trial = dict(zip(FIELDS, report))
+        engine().complete_report(ve, report)
+        complete = dict(zip(FIELDS, report))
+        left = {name for name in FIELDS if np.isnan(of_trial[name])}
+        costly = {"coordination_backbone", "mean_rotation", "sliding_contacts", "adhesive_contacts"}
+        self.assertEqual(left, costly | {name for name in FIELDS if name.startswith("fabric")})
+        for name in FIELDS:
+            self.assertTrue(np.isfinite(complete[name]), name)
+            self.assertTrue(name in left or complete[name] == of_trial[name], name)
 
     def test_contacts_are_looked_at_after_so_many_steps(self):
         ve = element(FRICTION)

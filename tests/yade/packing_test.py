@@ -1,6 +1,7 @@
 """Packings from dimensionless groups: on target, at rest, reproducible, with the stiffnesses and adhesion asked for."""
 
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -70,6 +71,37 @@ class Contacts(unittest.TestCase):
         c = contact_loop.contacts(select(element(BONDED)))
         self.assertTrue((contact_loop.values(c, "unp") == 0).all())
         self.assertTrue(contact_loop.values(c, "fragile").all())
+
+
+class Numbers(unittest.TestCase):
+    def loose(self):
+        """Rows (x, y, z, radius) of the spheres before they touch, by number."""
+
+        class Stopped(Exception):
+            pass
+
+        O = engine().O
+        O.switchToScene(0)
+        O.resetThisScene()
+        with mock.patch.object(packing, "_Servo", side_effect=Stopped), self.assertRaises(Stopped):
+            packing.prepare(O, {**FRICTION, "spheres": 200})
+        return np.array([[*b.state.pos, b.shape.radius] for b in O.bodies])
+
+    def test_spheres_near_to_one_another_have_near_numbers_and_are_those_of_the_seed(self):
+        with mock.patch.object(packing, "_along_mortons_curve", lambda x: np.arange(len(x))):
+            as_placed = self.loose()
+        numbered = self.loose()
+        self.assertEqual(set(map(tuple, numbered)), set(map(tuple, as_placed)))
+        apart = [np.linalg.norm(np.diff(x[:, :3], axis=0), axis=1).mean() for x in (numbered, as_placed)]
+        self.assertLess(apart[0], 0.5 * apart[1])
+        ids = contact_loop.contacts(select(element({**FRICTION, "spheres": 200}))).ids
+        self.assertLess(np.abs(ids[:, 0] - ids[:, 1]).mean(), 0.75 * 200 / 3)  # 200/3: numbers at random
+
+    def test_contacts_of_a_saved_scene_are_in_the_order_of_the_numbers(self):
+        O = select(element(ADHESIVE))
+        self.assertTrue(O.interactions.serializeSorted)
+        ids = [(i.id1, i.id2) for i in O.interactions]
+        self.assertEqual(ids, sorted(ids))
 
 
 class Refusals(unittest.TestCase):

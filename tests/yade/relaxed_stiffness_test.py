@@ -84,7 +84,7 @@ class Packing(unittest.TestCase):
             O = select(ve)
             for i in O.interactions:
                 i.phys.tangensOfFrictionAngle = 1e9
-            engine().deform(ve, np.array(E) / O.dt, 1)
+            engine().deform(ve, np.array(E) / engine().info(ve)["time_step"], 1)
             engine().deform(ve, np.zeros((3, 3)), steps)
             answer, report, _ = measure(ve)
             engine().remove(ve)

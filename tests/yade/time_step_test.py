@@ -37,8 +37,9 @@ def compressed(state, follow, factor):
     O.dt *= factor
     strain_rate = 5e-3 / engine().info(ve)["time_scale"]
     for _ in range(40):
-        steps = int(np.ceil(0.06 / 40 / (strain_rate * O.dt)))
-        engine().deform(ve, -np.eye(3) * 0.06 / 40 / (steps * O.dt), steps)
+        dt = engine().info(ve)["time_step"]
+        steps = int(np.ceil(0.06 / 40 / (strain_rate * dt)))
+        engine().deform(ve, -np.eye(3) * 0.06 / 40 / (steps * dt), steps)
         if follow:
             engine().follow_network(ve)
     stress, report, _ = measure(ve)
@@ -76,14 +77,18 @@ class TimeStep(unittest.TestCase):
         self.assertGreater(fixed[1], 0.2)
 
     def test_linear_contacts_can_keep_their_step(self):
-        """A loose packing gains a third of its contacts, and the step that it keeps stays below 0.9 of the critical one."""
-        state = template({**CELLS[0], "compaction_friction": 0.5})["state"]
-        pressure, unbalanced, over = compressed(state, True, 1.0)
-        print(f"pressure {pressure:.3g} Pa, unbalanced force {unbalanced:.1e}, time step over the critical one {over:.3f}")
-        self.assertGreater(pressure, 1e6)
-        self.assertLess(unbalanced, 0.02)
-        self.assertLess(over, 0.9)
-        self.assertNotEqual(over, 0.8)
+        """Loose packings gain a third of their contacts, and the step that they keep stays below the critical one, below 0.9
+        of it in the mean of eight (standard deviation of one: 0.04)."""
+        pressure, unbalanced, over = np.transpose(
+            [compressed(template({**CELLS[0], "compaction_friction": 0.5, "seed": s})["state"], True, 1.0) for s in range(1, 9)]
+        )
+        print(f"pressure {pressure.mean():.3g} Pa, unbalanced force {unbalanced.max():.1e}, "
+              f"time step over the critical one {over.mean():.3f}, at most {over.max():.3f}")
+        self.assertGreater(pressure.min(), 1e6)
+        self.assertLess(unbalanced.max(), 0.02)
+        self.assertLess(over.mean(), 0.9)
+        self.assertLess(over.max(), 1.0)
+        self.assertNotIn(0.8, over)
 
     def test_time_step_of_a_template_is_the_safety_factor_times_the_critical_one(self):
         half = template({**CELLS[0], "time_step_safety": 0.4})["manifest"]["time_step"]

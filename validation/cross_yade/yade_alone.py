@@ -4,7 +4,8 @@ gradient for simple shear. Nothing of femxdem takes part.
 
     yade_alone.py STATE PATH RATE CURVE.csv
 
-STATE is a file of the cache of `femxdem ve prepare`, PATH a name of paths.py, RATE [1/s] that of its driven component.
+STATE is a file of the cache of `femxdem ve prepare`, PATH a name of paths.py, RATE [1/s] that of its driven component. The
+scene counts time in the unit that its tag names.
 CURVE.csv: logarithmic strains (simple shear: xy is gamma) and Cauchy stresses [Pa], tension positive, every 5 steps.
 """
 
@@ -89,7 +90,7 @@ def controller(path, aim, rate):
 def main():
     state, name, rate, curve = sys.argv[1:]
     load(state)
-    rows = follow(PATHS[name], float(rate))
+    rows = follow(PATHS[name], float(rate) / float(O.tags["femxdem_units_of_time_in_a_second"]))
     with open(curve, "w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(["strain_xx", "strain_yy", "strain_zz", "shear", "stress_xx", "stress_yy", "stress_zz", "stress_xy"])

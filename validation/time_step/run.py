@@ -29,6 +29,7 @@ import numpy as np
 
 sys.path[:0] = [str(campaign.ROOT / "yade_scripts"), str(campaign.ROOT / "tests" / "yade")]
 import contact_loop
+import unit_of_time
 from cells import packing
 from time_step import critical_time_step
 from volume_element import Engine
@@ -64,9 +65,10 @@ class Packing:
         self.strain, number = path_of(spec["kappa"])
         self.rate = number / made["manifest"]["time_scale"]
         ve = self._at_forces()
-        self.automatic = engine.O.dt
-        self.critical = critical_time_step(engine.O, contact_loop.contacts(engine.O))
-        self.waves = PWaveTimeStep()
+        seconds = unit_of_time.of(engine.O).seconds
+        self.automatic = seconds(engine.O.dt)
+        self.critical = seconds(critical_time_step(engine.O, contact_loop.contacts(engine.O)))
+        self.waves = seconds(PWaveTimeStep())
         engine.remove(ve)
 
     def _at_forces(self, factor=None):
@@ -74,7 +76,7 @@ class Packing:
         ve = self.engine.add(self.state)
         self.engine.info(ve)  # makes it YADE's current one
         if factor:
-            self.engine.O.dt = factor * self.critical
+            self.engine.O.dt *= factor * self.critical / self.automatic
         return ve
 
     def answers(self, factor):
@@ -87,7 +89,7 @@ class Packing:
     def _along_the_path(self, ve):
         from yade._utils import kineticEnergy
 
-        dt = self.engine.O.dt
+        dt = self.engine.info(ve)["time_step"]
         each = int(np.ceil(max(self.strain / (self.rate * dt), LEAST_STEPS) / WINDOWS))
         L = DIRECTION * self.strain / (each * WINDOWS * dt)
         stress, report, stretch = np.empty(9), np.empty(len(self.engine.report_fields)), np.empty(9)
