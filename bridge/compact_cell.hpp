@@ -16,6 +16,13 @@ namespace femxdem {
 
 class CompactBlock;
 
+/// The last deform of a cell.
+struct CompactTrial {
+  double steps = 0;    ///< DEM steps
+  double rate = 0;     ///< norm of the strain rate [1/s]
+  double seconds = 0;  ///< wall time
+};
+
 /// Which compilation of the step runs: all give equal bits, the fastest that the processor has is the default.
 enum class Kernel { scalar, x86_64_v3, x86_64_v4 };
 
@@ -34,7 +41,7 @@ Kernel kernel_in_use();
 /// cells may be used by different threads at once. Tensors are row-major, tension positive, SI units.
 class CompactCell {
  public:
-  CompactCell() = default;  ///< without spheres: only to be assigned to
+  CompactCell();  ///< without spheres: only to be assigned to
   /// From what yade_scripts/compact_scene.py exports of a YADE scene. Throws UserError when it is not such an export.
   static CompactCell from_scene(std::string_view exported);
   /// From what save() gave. Throws UserError for what is truncated, changed or of another version.
@@ -85,6 +92,7 @@ class CompactCell {
 
  private:
   std::unique_ptr<CompactBlock> block_;
+  CompactTrial trial_;
 };
 
 }  // namespace femxdem
