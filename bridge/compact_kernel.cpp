@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "compact_cell.hpp"
@@ -17,6 +18,16 @@ namespace {
 
 // Vectors are only fast where every function that holds them is inlined into the one that has the processor's level.
 #define FEMXDEM_INLINE [[gnu::always_inline]] inline
+
+#define FEMXDEM_LAMBDA __attribute__((always_inline))
+
+/// f(0), f(1), ..., f(N - 1) with constants: arrays of vectors then live in registers.
+template <int N, class F>
+FEMXDEM_INLINE void repeat(F f) {
+  [&]<int... K>(std::integer_sequence<int, K...>) FEMXDEM_LAMBDA {
+    (f(std::integral_constant<int, K>{}), ...);
+  }(std::make_integer_sequence<int, N>{});
+}
 
 template <int W>
 struct Lanes {
@@ -59,20 +70,31 @@ FEMXDEM_INLINE V square_root(V a) {
     return __builtin_sqrt(a);
   } else {
     V r = a;
-    for (unsigned k = 0; k < sizeof(V) / sizeof(double); ++k) r[k] = __builtin_sqrt(a[k]);
+    repeat<sizeof(V) / sizeof(double)>([&](auto k) FEMXDEM_LAMBDA { r[int{k}] = __builtin_sqrt(a[int{k}]); });
     return r;
   }
 }
 
-/// Whether a comparison holds in some lane.
-template <class M>
-FEMXDEM_INLINE bool any(M m) {
-  if constexpr (std::is_integral_v<M>) {
-    return m != 0;
+// What is true is 1, what is not is 0: compilers scatter masks of 512 bits that are kept.
+template <class V>
+FEMXDEM_INLINE V greater(V a, V b) {
+  return a > b ? V{} + 1.0 : V{};
+}
+template <class V>
+FEMXDEM_INLINE V either(V which, V a, V b) {
+  return which > V{} ? a : b;
+}
+
+/// Whether something is true in some lane.
+template <int W>
+FEMXDEM_INLINE bool any(Vec<W> a) {
+  if constexpr (W == 1) {
+    return a > 0;
   } else {
-    auto sum = m[0];
-    for (unsigned k = 1; k < sizeof(M) / sizeof(m[0]); ++k) sum |= m[k];
-    return sum != 0;
+    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
+    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5);
+    if constexpr (W == 4) a += __builtin_shufflevector(a, a, 2, 3, 0, 1);
+    return a[0] + a[1] > 0;
   }
 }
 
@@ -98,18 +120,20 @@ FEMXDEM_INLINE void transpose(Vec<W>* rows) {
     rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
   } else if constexpr (W == 8) {
     Vec<8> a[8], b[8];
-    for (int k = 0; k < 8; k += 2) {
+    repeat<4>([&](auto pair) FEMXDEM_LAMBDA {
+      constexpr int k = 2 * pair;
       a[k] = __builtin_shufflevector(rows[k], rows[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
       a[k + 1] = __builtin_shufflevector(rows[k], rows[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-    }
-    for (int k : {0, 1, 4, 5}) {
+    });
+    repeat<4>([&](auto quarter) FEMXDEM_LAMBDA {
+      constexpr int k = quarter + (quarter > 1 ? 2 : 0);
       b[k] = __builtin_shufflevector(a[k], a[k + 2], 0, 1, 8, 9, 4, 5, 12, 13);
       b[k + 2] = __builtin_shufflevector(a[k], a[k + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    for (int k = 0; k < 4; ++k) {
+    });
+    repeat<4>([&](auto k) FEMXDEM_LAMBDA {
       rows[k] = __builtin_shufflevector(b[k], b[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
       rows[k + 4] = __builtin_shufflevector(b[k], b[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
+    });
   }
 }
 
@@ -167,17 +191,20 @@ struct Spheres {
 
   template <class Where>
   FEMXDEM_INLINE void gather(const CompactSphere* spheres, Where where) {
-    for (int chunk = 0; chunk < kNumbers; chunk += W) {
-      for (int k = 0; k < W; ++k)
+    repeat<kNumbers / W>([&](auto part) FEMXDEM_LAMBDA {
+      constexpr int chunk = W * part;
+      repeat<W>([&](auto k) FEMXDEM_LAMBDA {
         numbers[chunk + k] = load<Vec<W>>(reinterpret_cast<const double*>(spheres + where(k)) + chunk);
+      });
       transpose<W>(numbers + chunk);
-    }
+    });
   }
   FEMXDEM_INLINE void write(CompactSphere* to) {
-    for (int chunk = 0; chunk < kNumbers; chunk += W) {
+    repeat<kNumbers / W>([&](auto part) FEMXDEM_LAMBDA {
+      constexpr int chunk = W * part;
       transpose<W>(numbers + chunk);
-      for (int k = 0; k < W; ++k) store(reinterpret_cast<double*>(to + k) + chunk, numbers[chunk + k]);
-    }
+      repeat<W>([&](auto k) FEMXDEM_LAMBDA { store(reinterpret_cast<double*>(to + k) + chunk, numbers[chunk + k]); });
+    });
   }
   FEMXDEM_INLINE Vec3<W> at(int k) const { return {numbers[k], numbers[k + 1], numbers[k + 2]}; }
   FEMXDEM_INLINE void set(int k, const Vec3<W>& a) { numbers[k] = a.x, numbers[k + 1] = a.y, numbers[k + 2] = a.z; }
@@ -216,13 +243,13 @@ FEMXDEM_INLINE void turn(const std::array<double*, 4>& turned, std::size_t at, c
 template <int W>
 FEMXDEM_INLINE double integrate(const CompactArrays& a, const CompactMotion& m) {
   Vec<W> farthest{};
-  const auto damp = [&](const Vec3<W>& b, const Vec3<W>& v) {
+  const auto damp = [&](const Vec3<W>& b, const Vec3<W>& v) FEMXDEM_LAMBDA {
     return Vec3<W>{damped<W>(b.x, v.x, m.dt, m.damping), damped<W>(b.y, v.y, m.dt, m.damping),
                    damped<W>(b.z, v.z, m.dt, m.damping)};
   };
   for (std::size_t at = 0; at < a.header->spheres; at += W) {
     Spheres<W> s;
-    s.gather(a.spheres + at, [](int k) { return k; });
+    s.gather(a.spheres + at, [](int k) FEMXDEM_LAMBDA { return k; });
     const Vec<W> mass = load<Vec<W>>(a.mass + at), inertia = load<Vec<W>>(a.inertia + at);
     const Vec3<W> x = s.x(), v = s.v(), f = s.f(), t = s.t();
     const Vec3<W> fluctuation = v - times(m.previous_L, x);
@@ -241,7 +268,7 @@ FEMXDEM_INLINE double integrate(const CompactArrays& a, const CompactMotion& m) 
     s.set(0, place);
     s.set(3, velocity);
     s.set(6, spin);
-    for (int k = kForce; k < kNumbers; ++k) s.numbers[k] = Vec<W>{};
+    s.set(kForce, Vec3<W>{}), s.set(kForce + 3, Vec3<W>{});
     s.write(a.spheres + at);
   }
   double largest = 0;
@@ -259,8 +286,8 @@ struct Pairs {
   Vec3<W> shear;  ///< force turned with the contact, minus ks times the slip
 
   FEMXDEM_INLINE void measure(const CompactArrays& a, const CompactCellMotion& cell, std::size_t at) {
-    i.gather(a.spheres, [&](int k) { return a.i[at + static_cast<std::size_t>(k)]; });
-    j.gather(a.spheres, [&](int k) { return a.j[at + static_cast<std::size_t>(k)]; });
+    i.gather(a.spheres, [&](int k) FEMXDEM_LAMBDA { return a.i[at + static_cast<std::size_t>(k)]; });
+    j.gather(a.spheres, [&](int k) FEMXDEM_LAMBDA { return a.j[at + static_cast<std::size_t>(k)]; });
     const auto packed = load<typename Lanes<W>::I>(a.shift + at);
     const Vec3<W> periods = {to_double<W>((packed << 22) >> 22), to_double<W>((packed << 12) >> 22),
                              to_double<W>((packed << 2) >> 22)};
@@ -286,31 +313,32 @@ struct Pairs {
   }
 };
 
-/// Adds force f and torque t of lane k to the spheres `to(k)`, in the order of the lanes below `count`.
+/// Forces and torques of W contacts on one of their spheres each.
 template <int W>
 struct Wrenches {
-  Vec<W> numbers[W > 8 ? W : 8];
+  Vec<W> numbers[8];
 
   /// -0 leaves the spin and the radius beside a force as they are, to the bit.
   FEMXDEM_INLINE Wrenches(const Vec3<W>& f, const Vec3<W>& t)
       : numbers{splat<W>(-0.0), splat<W>(-0.0), f.x, f.y, f.z, t.x, t.y, t.z} {
-    for (int chunk = 0; chunk < 8; chunk += W) transpose<W>(numbers + chunk);
+    repeat<8 / W>([&](auto part) FEMXDEM_LAMBDA { transpose<W>(numbers + W * part); });
   }
   FEMXDEM_INLINE void add(CompactSphere* to, int k) const {
-    for (int chunk = 0; chunk < 8; chunk += W) {
-      double* place = reinterpret_cast<double*>(to) + 8 + chunk;
-      store(place, load<Vec<W>>(place) + numbers[chunk + k]);
-    }
+    repeat<8 / W>([&](auto part) FEMXDEM_LAMBDA {
+      double* place = reinterpret_cast<double*>(to) + 8 + W * part;
+      store(place, load<Vec<W>>(place) + numbers[W * part + k]);
+    });
   }
 };
 
 template <int W>
 FEMXDEM_INLINE void push(const CompactArrays& a, std::size_t at, const Wrenches<W>& on_i, const Wrenches<W>& on_j) {
-  const std::size_t count = std::min<std::size_t>(W, a.header->contacts - at);
-  for (std::size_t k = 0; k < count; ++k) {
-    on_i.add(a.spheres + a.i[at + k], static_cast<int>(k));
-    on_j.add(a.spheres + a.j[at + k], static_cast<int>(k));
-  }
+  const std::size_t count = a.header->contacts - at;
+  repeat<W>([&](auto k) FEMXDEM_LAMBDA {
+    if (k >= count) return;
+    on_i.add(a.spheres + a.i[at + k], k);
+    on_j.add(a.spheres + a.j[at + k], k);
+  });
 }
 
 /// The classes of W contacts, number by number.
@@ -338,10 +366,9 @@ struct Classes {
   }
 };
 
-template <int W, class Mask>
-FEMXDEM_INLINE std::size_t note(const CompactArrays& a, std::size_t at, Mask mask, std::uint32_t* lost) {
-  if (!any(mask)) return 0;
-  Vec<W> ends = mask ? splat<W>(1.0) : splat<W>(0.0);
+/// Appends the contacts in whose lanes `ends` is true; how many.
+template <int W>
+FEMXDEM_INLINE std::size_t note(const CompactArrays& a, std::size_t at, Vec<W> ends, std::uint32_t* lost) {
   std::size_t count = 0;
   for (int k = 0; k < W; ++k)
     if (lane<W>(ends, k) != 0 && at + static_cast<std::size_t>(k) < a.header->contacts)
@@ -349,10 +376,8 @@ FEMXDEM_INLINE std::size_t note(const CompactArrays& a, std::size_t at, Mask mas
   return count;
 }
 
-template <int W, class Mask>
-FEMXDEM_INLINE void break_bonds(const CompactArrays& a, std::size_t at, Mask mask) {
-  if (!any(mask)) return;
-  Vec<W> breaks = mask ? splat<W>(1.0) : splat<W>(0.0);
+template <int W>
+FEMXDEM_INLINE void break_bonds(const CompactArrays& a, std::size_t at, Vec<W> breaks) {
   for (int k = 0; k < W; ++k) {
     std::uint32_t& c = a.class_of[at + static_cast<std::size_t>(k)];
     if (lane<W>(breaks, k) != 0) c = static_cast<std::uint32_t>(a.classes[c].when_broken);
@@ -370,24 +395,22 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
     const Vec<W> kn = load<Vec<W>>(a.kn + at);
     Vec<W> unp = load<Vec<W>>(a.unp + at);
     Vec<W> normal_force = kn * (p.overlap - unp);
-    const auto torn = -normal_force > c.adhesion;
-    const auto fragile = c.fragile > zero;
-    const auto yields = torn & (c.fragile == zero);
-    normal_force = yields ? -c.adhesion : normal_force;
-    unp = yields ? p.overlap + c.adhesion / kn : unp;
-    const auto ends = torn & (fragile | ((c.unp_max >= zero) & (-unp > c.unp_max)));
+    const Vec<W> torn = greater(-normal_force, c.adhesion), yields = either(c.fragile, zero, torn);
+    normal_force = either(yields, -c.adhesion, normal_force);
+    unp = either(yields, p.overlap + c.adhesion / kn, unp);
+    const Vec<W> beyond = c.unp_max >= zero ? greater(-unp, c.unp_max) : zero;
+    const Vec<W> ends = either(c.fragile + beyond, torn, zero);
     const Vec<W> friction = normal_force * c.tangent;
     Vec<W> limit = c.shear_adhesion + friction;
     limit = limit > zero ? limit : zero;
-    const Vec<W> size = square_root(dot(p.shear, p.shear));
-    const auto slides = size > limit;
-    const auto breaks = slides & fragile & (c.broken == zero);
-    limit = breaks ? (friction > zero ? friction : zero) : limit;
-    const Vec<W> ratio = slides ? limit / size : splat<W>(1.0);
-    const Vec3<W> shear = scaled<W>(ratio, p.shear);
-    normal_force = slides & (normal_force < zero) ? zero : normal_force;
+    const Vec<W> size = square_root(dot(p.shear, p.shear)), slides = greater(size, limit);
+    const Vec<W> breaks = either(c.fragile - c.broken, slides, zero);
+    limit = either(breaks, friction > zero ? friction : zero, limit);
+    const Vec3<W> shear = scaled<W>(either(slides, limit / size, splat<W>(1.0)), p.shear);
+    const Vec<W> pulls = greater(zero, normal_force);
+    normal_force = either(slides * pulls, zero, normal_force);
     Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
-    f = {ends ? zero : f.x, ends ? zero : f.y, ends ? zero : f.z};
+    f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
     const Vec3<W> xi = p.i.x(), point = xi + scaled<W>(p.i.radius() - 0.5 * p.overlap, p.normal);
     const Wrenches<W> on_i(f, cross(point - xi, f)), on_j(-f, -cross(point - p.shifted, f));
     push<W>(a, at, on_i, on_j);
@@ -395,6 +418,7 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
     store(a.normal_force + at, normal_force);
     store3<W>(a.shear, at, shear);
     store3<W>(a.normal, at, p.normal);
+    if (!any<W>(breaks + ends)) continue;
     break_bonds<W>(a, at, breaks);
     lost_count += note<W>(a, at, ends, lost + lost_count);
   }
@@ -409,15 +433,14 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
     Pairs<W> p;
     p.measure(a, cell, at);
     const Classes<W> c(a, at);
-    const auto ends = p.overlap < zero;
-    const Vec<W> normal_force = load<Vec<W>>(a.kn + at) * (ends ? zero : p.overlap);
+    const Vec<W> ends = greater(zero, p.overlap);
+    const Vec<W> normal_force = load<Vec<W>>(a.kn + at) * (p.overlap > zero ? p.overlap : zero);
     const Vec3<W> N = scaled<W>(normal_force, p.normal);
-    const Vec<W> limit = dot(N, N) * (c.tangent * c.tangent);
-    const Vec<W> size = dot(p.shear, p.shear);
-    const Vec<W> ratio = size > limit ? square_root(limit) / square_root(size) : splat<W>(1.0);
-    const Vec3<W> shear = scaled<W>(ratio, p.shear);
+    const Vec<W> limit = dot(N, N) * (c.tangent * c.tangent), size = dot(p.shear, p.shear);
+    const Vec<W> ratio = square_root(limit) / square_root(size);
+    const Vec3<W> shear = scaled<W>(size > limit ? ratio : splat<W>(1.0), p.shear);
     Vec3<W> f = -N - shear;
-    f = {ends ? zero : f.x, ends ? zero : f.y, ends ? zero : f.z};
+    f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
     const Vec3<W> t = cross(p.normal, f);
     const Vec<W> half = 0.5 * p.overlap;
     const Wrenches<W> on_i(f, scaled<W>(p.i.radius() - half, t)), on_j(-f, scaled<W>(p.j.radius() - half, t));
@@ -425,7 +448,7 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
     store(a.normal_force + at, normal_force);
     store3<W>(a.shear, at, shear);
     store3<W>(a.normal, at, p.normal);
-    lost_count += note<W>(a, at, ends, lost + lost_count);
+    if (any<W>(ends)) lost_count += note<W>(a, at, ends, lost + lost_count);
   }
   return lost_count;
 }
