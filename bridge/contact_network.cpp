@@ -1,17 +1,14 @@
-#include <pybind11/numpy.h>
+#include "contact_network.hpp"
 
 #include <Eigen/CholmodSupport>
-#include <array>
+#include <Eigen/Geometry>
+#include <cmath>
 #include <stdexcept>
 #include <vector>
 
-/// The relaxed elastic stiffness of a contact network, for the Python side (yade_scripts/contact_loop.py).
-namespace py = pybind11;
-
+namespace femxdem {
 namespace {
 
-using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Block = Eigen::Matrix<double, 3, 12>;  ///< relative displacement at a contact over (u_i, w_i, u_j, w_j)
 
 constexpr std::array<std::array<int, 2>, 6> kStrains = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
@@ -38,12 +35,13 @@ class Network {
     entries_.reserve(78 * contacts + static_cast<std::size_t>(size_));
   }
 
-  void add(std::int64_t i, std::int64_t j, const Eigen::Vector3d& n, double length, double kn, double kt) {
+  void add(const Spring& s) {
+    const auto& [i, j, n, length, kn, kt] = s;
     const Eigen::Matrix3d spring = kt * Eigen::Matrix3d::Identity() + (kn - kt) * n * n.transpose();
     const Block B = relative_displacement(n);
     const Eigen::Matrix<double, 12, 3> force = B.transpose() * spring;
     const Eigen::Matrix<double, 12, 12> K = force * B;
-    const auto row = [&](int a) { return 6 * (a < 6 ? i : j) + a % 6; };
+    const auto row = [&s](int a) { return 6 * (a < 6 ? s.i : s.j) + a % 6; };
     for (int a = 0; a < 12; ++a) {
       for (int b = 0; b < 12; ++b)
         if (row(a) >= row(b)) entries_.emplace_back(row(a), row(b), K(a, b));
@@ -79,38 +77,87 @@ class Network {
   std::size_t contacts_ = 0;
 };
 
-/// See the docstring below.
-Numbers released_stiffness(std::int64_t grains, const Indices& ids, const Numbers& normal, const Numbers& length,
-                           const Numbers& kn, const Numbers& kt, double volume) {
-  const auto m = ids.shape(0);
-  const auto id = ids.unchecked<2>();
-  const auto n = normal.unchecked<2>();
-  const auto l = length.unchecked<1>(), k = kn.unchecked<1>(), s = kt.unchecked<1>();
-  if (m == 0 || n.shape(0) != m || l.shape(0) != m || k.shape(0) != m || s.shape(0) != m)
-    throw std::invalid_argument("released_stiffness: one row of every array for each contact");
-  Network network(grains, static_cast<std::size_t>(m));
-  for (py::ssize_t c = 0; c < m; ++c) {
-    if (id(c, 0) < 0 || id(c, 0) >= grains || id(c, 1) < 0 || id(c, 1) >= grains)
-      throw std::invalid_argument("released_stiffness: a contact of a grain that is not there");
-    network.add(id(c, 0), id(c, 1), Eigen::Vector3d(n(c, 0), n(c, 1), n(c, 2)), l(c), k(c), s(c));
-  }
-  const Eigen::MatrixXd energy = network.released_energy() / volume;
-  Numbers result({6, 6});
-  auto out = result.mutable_unchecked<2>();
-  for (int a = 0; a < 6; ++a)
-    for (int b = 0; b < 6; ++b) out(a, b) = 0.5 * (energy(a, b) + energy(b, a));
-  return result;
-}
+/// Place of the strain component (i, j) in kStrains.
+constexpr std::array<std::array<int, 3>, 3> kPlace = {{{0, 3, 5}, {3, 1, 4}, {5, 4, 2}}};
+
+constexpr int kIterations = 60;  ///< of the power iteration
 
 }  // namespace
 
-PYBIND11_MODULE(contact_network, module) {
-  module.def(
-      "released_stiffness", &released_stiffness, py::arg("grains"), py::arg("ids"), py::arg("normal"),
-      py::arg("length"), py::arg("kn"), py::arg("kt"), py::arg("volume"),
-      "What the stiffness of a periodic contact network loses when its grains move and spin into equilibrium:\n"
-      "(1/V) F^T K^-1 F, (6, 6) [Pa] over the strain components xx, yy, zz, xy, yz, zx (tensor, not engineering),\n"
-      "K and F the network's stiffness and loads under a unit strain.\n"
-      "ids (m, 2), normal (m, 3) from the first to the second, length (m,) of the branch vectors [m], kn, kt\n"
-      "(m,) [N/m], volume [m^3].");
+std::array<double, 81> affine_stiffness(std::span<const Spring> springs, double volume) {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix3d G = Eigen::Matrix3d::Zero();
+  for (const Spring& s : springs) {
+    const double l2 = s.length * s.length / volume;
+    Eigen::Matrix<double, 6, 1> nn;
+    for (int a = 0; a < 6; ++a) {
+      const auto [k, l] = kStrains[static_cast<std::size_t>(a)];
+      nn[a] = s.normal[k] * s.normal[l];
+    }
+    normal += ((s.kn - s.kt) * l2) * nn * nn.transpose();
+    G += (0.25 * s.kt * l2) * s.normal * s.normal.transpose();
+  }
+  std::array<double, 81> C{};
+  const auto place = [](int i, int j) { return kPlace[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]; };
+  std::size_t at = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          C[at++] = normal(place(i, j), place(k, l)) + (i == k) * G(j, l) + (i == l) * G(j, k) + (j == k) * G(i, l) +
+                    (j == l) * G(i, k);
+  return C;
 }
+
+Eigen::MatrixXd released_stiffness(std::int64_t grains, std::span<const Spring> springs, double volume) {
+  Network network(grains, springs.size());
+  for (const Spring& s : springs) {
+    if (s.i < 0 || s.i >= grains || s.j < 0 || s.j >= grains)
+      throw std::invalid_argument("released_stiffness: a contact of a grain that is not there");
+    network.add(s);
+  }
+  const Eigen::MatrixXd energy = network.released_energy() / volume;
+  return 0.5 * (energy + energy.transpose());
+}
+
+std::array<double, 81> relaxed_stiffness(std::int64_t grains, std::span<const Spring> springs, double volume) {
+  std::array<double, 81> C = affine_stiffness(springs, volume);
+  const Eigen::MatrixXd released = released_stiffness(grains, springs, volume);
+  for (std::size_t at = 0; at < 81; ++at) C[at] -= released(kPlace[at / 27][at / 9 % 3], kPlace[at / 3 % 3][at % 3]);
+  return C;
+}
+
+double critical_time_step(std::span<const NetworkGrain> grains, std::span<const Spring> springs,
+                          std::span<const double> start) {
+  using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic>;
+  const auto n = static_cast<Eigen::Index>(grains.size());
+  Rows u = Eigen::Map<const Rows>(start.data(), 3, n), w = Eigen::Map<const Rows>(start.data() + 3 * n, 3, n);
+  double omega2 = 0;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    Rows force = Rows::Zero(3, n), torque = Rows::Zero(3, n);
+    for (const Spring& s : springs) {
+      const double ri = grains[static_cast<std::size_t>(s.i)].radius, rj = grains[static_cast<std::size_t>(s.j)].radius;
+      const Eigen::Vector3d spin = ri * w.col(s.i) + rj * w.col(s.j);
+      const Eigen::Vector3d d = u.col(s.j) - u.col(s.i) - spin.cross(s.normal);
+      const Eigen::Vector3d along = d.dot(s.normal) * s.normal, f = s.kn * along + s.kt * (d - along);
+      const Eigen::Vector3d t = s.normal.cross(f);
+      force.col(s.j) += f, force.col(s.i) -= f;
+      torque.col(s.i) -= ri * t, torque.col(s.j) -= rj * t;
+    }
+    double kinetic = 0;
+    for (Eigen::Index g = 0; g < n; ++g) {
+      const NetworkGrain& grain = grains[static_cast<std::size_t>(g)];
+      kinetic += grain.mass * u.col(g).squaredNorm() + grain.inertia * w.col(g).squaredNorm();
+    }
+    omega2 = (u.cwiseProduct(force).sum() + w.cwiseProduct(torque).sum()) / kinetic;  // Rayleigh's quotient
+    for (Eigen::Index g = 0; g < n; ++g) {
+      u.col(g) = force.col(g) / grains[static_cast<std::size_t>(g)].mass;
+      w.col(g) = torque.col(g) / grains[static_cast<std::size_t>(g)].inertia;
+    }
+    const double size = u.norm();
+    u /= size, w /= size;
+  }
+  return 2 / std::sqrt(omega2);
+}
+
+}  // namespace femxdem

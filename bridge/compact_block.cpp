@@ -1,0 +1,185 @@
+#include "compact_block.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "errors.hpp"
+
+namespace femxdem {
+namespace {
+
+constexpr std::size_t kLine = 64;
+
+std::size_t padded(std::size_t count) {
+  return (count + CompactArrays::kLanes - 1) / CompactArrays::kLanes * CompactArrays::kLanes;
+}
+
+/// Hands out consecutive arrays of a block; from nothing it finds how large the block is.
+class Layout {
+ public:
+  explicit Layout(std::byte* base) : base_(base) {}
+  template <class T>
+  void operator()(T*& array, std::size_t count) {
+    array = base_ ? reinterpret_cast<T*>(base_ + offset_) : nullptr;
+    offset_ += (count * sizeof(T) + kLine - 1) / kLine * kLine;
+  }
+  template <class T, std::size_t N>
+  void operator()(std::array<T*, N>& arrays, std::size_t count) {
+    for (T*& array : arrays) (*this)(array, count);
+  }
+  std::size_t bytes() const { return offset_; }
+
+ private:
+  std::byte* base_;
+  std::size_t offset_ = 0;
+};
+
+/// The arrays of a block at `base` with the capacities of `header`; returns the bytes that they take.
+std::size_t lay_out(std::byte* base, const CompactHeader& header, CompactArrays& a) {
+  Layout place(base);
+  const std::size_t n = padded(header.spheres), m = padded(header.contact_capacity);
+  place(a.header, 1);
+  place(a.spheres, n);
+  for (double** array : {&a.mass, &a.inertia, &a.young, &a.poisson, &a.tangent}) place(*array, n);
+  place(a.turned, n);
+  place(a.list_x, n);
+  place(a.classes, header.classes);
+  place(a.i, m);
+  place(a.j, m);
+  place(a.shift, m);
+  place(a.class_of, m);
+  for (double** array : {&a.kn, &a.ks, &a.unp, &a.normal_force}) place(*array, m);
+  place(a.shear, m);
+  place(a.normal, m);
+  place(a.pairs, header.pair_capacity);
+  place(a.start, header.start_vectors ? std::size_t{6} * header.spheres : 0);
+  return place.bytes();
+}
+
+std::size_t size_of(const CompactHeader& header) {
+  CompactArrays nowhere;
+  return lay_out(nullptr, header, nowhere);
+}
+
+/// FNV-1a over words of eight bytes in four lanes; the checksum's own place counts as zero.
+std::uint64_t checksum(std::string_view bytes) {
+  constexpr std::uint64_t kPrime = 0x100000001b3ULL;
+  std::array<std::uint64_t, 4> lanes = {0xcbf29ce484222325ULL, 1, 2, 3};
+  const std::size_t words = bytes.size() / 8;
+  for (std::size_t k = 0; k < words; ++k) {
+    std::uint64_t word;
+    std::memcpy(&word, bytes.data() + 8 * k, 8);
+    if (8 * k == offsetof(CompactHeader, checksum)) word = 0;
+    std::uint64_t& lane = lanes[k % 4];
+    lane = (lane ^ word) * kPrime;
+    lane ^= lane >> 29;
+  }
+  std::uint64_t sum = bytes.size();
+  for (const std::uint64_t lane : lanes) sum = (sum ^ lane) * kPrime;
+  return sum ^ sum >> 32;
+}
+
+/// Indices that point outside of their arrays would be read in every step.
+bool consistent(const CompactArrays& a) {
+  const CompactHeader& h = *a.header;
+  if (h.spheres < 2 || h.contacts > h.contact_capacity || h.pairs > h.pair_capacity || h.classes == 0) return false;
+  const auto pair = [&](std::uint32_t i, std::uint32_t j) { return i < j && j < h.spheres; };
+  for (std::uint32_t c = 0; c < h.contacts; ++c)
+    if (!pair(a.i[c], a.j[c]) || a.class_of[c] >= h.classes) return false;
+  for (std::uint32_t c = 0; c < h.pairs; ++c)
+    if (!pair(a.pairs[c].i, a.pairs[c].j)) return false;
+  for (std::uint32_t k = 0; k < h.classes; ++k)
+    if (!(a.classes[k].when_broken >= 0 && a.classes[k].when_broken < h.classes && a.classes[k].when_aged < h.classes))
+      return false;
+  return h.time_step >= 0 && std::isfinite(h.H[0]) && (h.law == CompactLaw::cohesive || h.law == CompactLaw::friction);
+}
+
+}  // namespace
+
+CompactBlock::CompactBlock(const CompactHeader& header) {
+  const std::size_t bytes = size_of(header);
+  lines_.assign(bytes / kLine, Line{});
+  CompactHeader first = header;
+  first.bytes = bytes;
+  std::memcpy(lines_.data(), &first, sizeof first);
+  bind();
+}
+
+CompactBlock::CompactBlock(std::string_view saved) {
+  const std::string fault = why_invalid(saved);
+  if (!fault.empty()) throw UserError(fault);
+  lines_.resize(saved.size() / kLine);
+  std::memcpy(static_cast<void*>(lines_.data()), saved.data(), saved.size());
+  bind();
+}
+
+void CompactBlock::bind() {
+  auto* base = reinterpret_cast<std::byte*>(lines_.data());
+  lay_out(base, *reinterpret_cast<CompactHeader*>(base), arrays_);
+}
+
+void CompactBlock::assign(const CompactBlock& other) {
+  lines_.resize(other.lines_.size());
+  std::memcpy(static_cast<void*>(lines_.data()), other.lines_.data(), other.lines_.size() * kLine);
+  bind();
+}
+
+void CompactBlock::grow(std::size_t contacts, std::size_t pairs) {
+  CompactHeader larger = header();
+  larger.contact_capacity = static_cast<std::uint32_t>(std::max<std::size_t>(contacts, larger.contact_capacity));
+  larger.pair_capacity = static_cast<std::uint32_t>(std::max<std::size_t>(pairs, larger.pair_capacity));
+  CompactBlock grown(larger);
+  const CompactArrays &a = arrays_, &b = grown.arrays_;
+  const auto copy = [](const auto* from, std::size_t count, auto* to) { std::copy_n(from, count, to); };
+  const auto copies = [&](const auto& from, std::size_t count, const auto& to) {
+    for (std::size_t k = 0; k < from.size(); ++k) copy(from[k], count, to[k]);
+  };
+  const std::size_t n = padded(larger.spheres), m = larger.contacts;
+  copy(a.spheres, n, b.spheres);
+  copies(std::array{a.mass, a.inertia, a.young, a.poisson, a.tangent}, n,
+         std::array{b.mass, b.inertia, b.young, b.poisson, b.tangent});
+  copies(a.turned, n, b.turned);
+  copies(a.list_x, n, b.list_x);
+  copy(a.classes, larger.classes, b.classes);
+  copies(std::array{a.i, a.j, a.class_of}, m, std::array{b.i, b.j, b.class_of});
+  copy(a.shift, m, b.shift);
+  copies(std::array{a.kn, a.ks, a.unp, a.normal_force}, m, std::array{b.kn, b.ks, b.unp, b.normal_force});
+  copies(a.shear, m, b.shear);
+  copies(a.normal, m, b.normal);
+  copy(a.pairs, larger.pairs, b.pairs);
+  if (larger.start_vectors) copy(a.start, std::size_t{6} * larger.spheres, b.start);
+  lines_.swap(grown.lines_);
+  bind();
+}
+
+std::string CompactBlock::save() const {
+  std::string bytes(reinterpret_cast<const char*>(lines_.data()), lines_.size() * kLine);
+  const std::uint64_t sum = checksum(bytes);
+  std::memcpy(bytes.data() + offsetof(CompactHeader, checksum), &sum, sizeof sum);
+  return bytes;
+}
+
+std::string CompactBlock::why_invalid(std::string_view saved) {
+  CompactHeader header;
+  const std::string what = "state of a volume element";
+  if (saved.size() < sizeof header || saved.size() % kLine != 0) return what + ": it is truncated; save it again";
+  std::memcpy(&header, saved.data(), sizeof header);
+  if (header.magic != CompactHeader::kMagic) return what + ": it is not one of the compact engine's";
+  if (header.version != CompactHeader::kVersion)
+    return fmt::format("{}: its version is {}, this program reads version {}; go on with the program that wrote it",
+                       what, header.version, CompactHeader::kVersion);
+  if (header.bytes != saved.size() || size_of(header) != saved.size())
+    return fmt::format("{}: it has {} bytes instead of {}; it is truncated or changed, save it again", what,
+                       saved.size(), header.bytes);
+  if (checksum(saved) != header.checksum) return what + ": its checksum is wrong; it has been changed, save it again";
+  std::vector<Line> copy(saved.size() / kLine);
+  std::memcpy(static_cast<void*>(copy.data()), saved.data(), saved.size());
+  CompactArrays arrays;
+  lay_out(reinterpret_cast<std::byte*>(copy.data()), header, arrays);
+  return consistent(arrays) ? "" : what + ": it contradicts itself; save it again";
+}
+
+}  // namespace femxdem

@@ -1,0 +1,143 @@
+#include "compact_cell.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "compact_report.hpp"
+#include "compact_scene.hpp"
+#include "compact_step.hpp"
+#include "contact_network.hpp"
+
+namespace femxdem {
+namespace {
+
+constexpr std::array<double, 2> kKept = {0.6, 1.1};  ///< time step over the safe one that is left alone (time_step.py)
+
+/// Norm of the symmetric part of L [1/s].
+double rate(const Row3& L) {
+  double sum = 0;
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 3; ++c) sum += std::pow(L[3 * r + c] + L[3 * c + r], 2);
+  return std::sqrt(sum) / 2;
+}
+
+/// The mean of a quantity over time from samples, by the trapezoidal rule.
+class Mean {
+ public:
+  void add(long step, const Row3& value) {
+    for (std::size_t k = 0; count_ > 0 && k < 9; ++k)
+      sum_[k] += 0.5 * static_cast<double>(step - last_step_) * (last_[k] + value[k]);
+    last_ = value, last_step_ = step;
+    ++count_;
+  }
+  Row3 over(long steps) const {
+    Row3 mean;
+    for (std::size_t k = 0; k < 9; ++k) mean[k] = sum_[k] / static_cast<double>(steps);
+    return mean;
+  }
+
+ private:
+  Row3 sum_{}, last_{};
+  long last_step_ = 0, count_ = 0;
+};
+
+}  // namespace
+
+CompactCell::CompactCell() = default;
+CompactCell::CompactCell(CompactCell&&) noexcept = default;
+CompactCell& CompactCell::operator=(CompactCell&&) noexcept = default;
+CompactCell::~CompactCell() = default;
+
+CompactCell::CompactCell(const CompactCell& other) { *this = other; }
+
+CompactCell& CompactCell::operator=(const CompactCell& other) {
+  if (this == &other) return *this;
+  if (!other.block_)
+    block_.reset();
+  else if (block_)
+    block_->assign(*other.block_);
+  else
+    block_ = std::make_unique<CompactBlock>(*other.block_);
+  trial_ = other.trial_;
+  return *this;
+}
+
+CompactCell CompactCell::from_scene(std::string_view exported) {
+  CompactCell cell;
+  cell.block_ = std::make_unique<CompactBlock>(block_of_scene(exported));
+  return cell;
+}
+
+CompactCell CompactCell::load(std::string_view saved) {
+  CompactCell cell;
+  cell.block_ = std::make_unique<CompactBlock>(saved);
+  return cell;
+}
+
+std::string CompactCell::save() const { return block_->save(); }
+
+std::optional<std::string> CompactCell::why_invalid(std::string_view saved) {
+  std::string fault = CompactBlock::why_invalid(saved);
+  return fault.empty() ? std::nullopt : std::optional(std::move(fault));
+}
+
+std::string CompactCell::to_scene() const { return scene_of_block(*block_); }
+std::size_t CompactCell::memory() const { return block_->memory(); }
+std::size_t CompactCell::size() const { return block_->header().spheres; }
+std::size_t CompactCell::contacts() const { return block_->header().contacts; }
+
+CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, long sample_every) {
+  const auto started = std::chrono::steady_clock::now();
+  Deformed result;
+  result.mean_stress.fill(std::numeric_limits<double>::quiet_NaN());
+  if (steps > 0) block_->header().L = L;
+  Mean mean;
+  try {
+    if (sample_every > 0) mean.add(0, stress());
+    for (long k = 1; k <= steps; ++k) {
+      step(*block_);
+      if (sample_every > 0 && (k % sample_every == 0 || k == steps)) mean.add(k, stress());
+    }
+  } catch (const std::runtime_error& reason) {
+    result.failure = reason.what();
+  }
+  if (sample_every > 0 && !result.failure) result.mean_stress = steps > 0 ? mean.over(steps) : stress();
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - started;
+  trial_ = {static_cast<double>(steps), rate(L), taken.count()};
+  return result;
+}
+
+Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }
+Row3 CompactCell::stretch() const { return block_->header().trsf; }
+double CompactCell::unbalanced_force() const { return femxdem::unbalanced_force(block_->arrays()); }
+PointReport CompactCell::report() const { return femxdem::report(block_->arrays(), trial_); }
+
+VeInfo CompactCell::info() const {
+  const CompactHeader& h = block_->header();
+  const double pressure = femxdem::pressure(love_weber(block_->arrays()));
+  return {h.time_step, time_scale(h, pressure), determinant(h.H), static_cast<double>(h.spheres), h.mean_diameter,
+          pressure};
+}
+
+std::array<double, 81> CompactCell::stiffness(bool relaxed) const {
+  const std::vector<Spring> network = springs(block_->arrays());
+  const CompactHeader& h = block_->header();
+  const double volume = determinant(h.H);
+  return relaxed ? relaxed_stiffness(h.spheres, network, volume) : affine_stiffness(network, volume);
+}
+
+void CompactCell::follow_network() {
+  CompactHeader& h = block_->header();
+  const CompactArrays& a = block_->arrays();
+  if (std::isnan(h.safety) || !h.start_vectors || h.contacts == 0) return;
+  std::vector<NetworkGrain> grains;
+  for (std::size_t s = 0; s < h.spheres; ++s) grains.push_back({a.mass[s], a.inertia[s], a.spheres[s].radius});
+  const std::vector<Spring> network = springs(a);
+  const double safe = h.safety * critical_time_step(grains, network, {a.start, std::size_t{6} * h.spheres});
+  const double ratio = h.time_step / safe;
+  if (!(kKept[0] <= ratio && ratio <= kKept[1])) h.time_step = safe;
+}
+
+}  // namespace femxdem

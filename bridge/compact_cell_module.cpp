@@ -1,0 +1,94 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include "compact_block.hpp"
+#include "compact_cell.hpp"
+#include "errors.hpp"
+
+/// The compact cell for Python: tests, the referee and scripts.
+namespace py = pybind11;
+using femxdem::CompactCell;
+
+namespace {
+
+template <std::size_t N>
+py::array_t<double> array(const std::array<double, N>& numbers, const std::vector<py::ssize_t>& shape) {
+  return py::array_t<double>(shape, numbers.data());
+}
+
+std::array<double, 9> tensor(const py::array_t<double, py::array::c_style | py::array::forcecast>& a) {
+  if (a.size() != 9) throw femxdem::UserError("a velocity gradient has 3 x 3 numbers");
+  std::array<double, 9> numbers;
+  std::copy_n(a.data(), 9, numbers.begin());
+  return numbers;
+}
+
+py::dict report(const CompactCell& cell) {
+  const femxdem::PointReport r = cell.report();
+  py::dict values;
+  for (std::size_t k = 0; k < r.values.size(); ++k)
+    values[py::str(std::string(femxdem::kReportFields[k]))] = r.values[k];
+  return values;
+}
+
+py::dict info(const CompactCell& cell) {
+  const femxdem::VeInfo i = cell.info();
+  return py::dict(py::arg("time_step") = i.time_step, py::arg("time_scale") = i.time_scale,
+                  py::arg("volume") = i.volume, py::arg("spheres") = i.spheres,
+                  py::arg("mean_diameter") = i.mean_diameter, py::arg("mean_stress") = i.mean_stress);
+}
+
+/// Raises RuntimeError with the sentence of a failure.
+py::array_t<double> deform(CompactCell& cell, const py::array_t<double, py::array::c_style | py::array::forcecast>& L,
+                           long steps, long sample_every) {
+  CompactCell::Deformed deformed;
+  const auto numbers = tensor(L);
+  {
+    const py::gil_scoped_release released;
+    deformed = cell.deform(numbers, steps, sample_every);
+  }
+  if (deformed.failure) throw std::runtime_error(*deformed.failure);
+  return array(deformed.mean_stress, {3, 3});
+}
+
+}  // namespace
+
+PYBIND11_MODULE(compact_cell, module) {
+  py::register_exception<femxdem::UserError>(module, "UserError", PyExc_ValueError);
+  py::enum_<femxdem::Kernel>(module, "Kernel")
+      .value("scalar", femxdem::Kernel::scalar)
+      .value("x86_64_v3", femxdem::Kernel::x86_64_v3)
+      .value("x86_64_v4", femxdem::Kernel::x86_64_v4);
+  module.def("kernels", &femxdem::kernels, "The kernels that this processor has, slowest first.");
+  module.def("use_kernel", &femxdem::use_kernel);
+  module.def("kernel_in_use", &femxdem::kernel_in_use);
+  module.def("why_invalid", [](const py::bytes& saved) { return CompactCell::why_invalid(std::string(saved)); });
+  py::class_<CompactCell>(module, "CompactCell", "See bridge/compact_cell.hpp.")
+      .def_static("from_scene",
+                  [](const py::bytes& exported) { return CompactCell::from_scene(std::string(exported)); })
+      .def_static("load", [](const py::bytes& saved) { return CompactCell::load(std::string(saved)); })
+      .def("save", [](const CompactCell& c) { return py::bytes(c.save()); })
+      .def("to_scene", [](const CompactCell& c) { return py::bytes(c.to_scene()); })
+      .def("copy", [](const CompactCell& c) { return CompactCell(c); })
+      .def("assign", [](CompactCell& c, const CompactCell& other) { c = other; })
+      .def("deform", &deform, py::arg("L"), py::arg("steps"), py::arg("sample_every") = 0)
+      .def("stress",
+           [](const CompactCell& c) {
+             return array(c.stress(), {3, 3});
+           })
+      .def("stretch",
+           [](const CompactCell& c) {
+             return array(c.stretch(), {3, 3});
+           })
+      .def("stiffness",
+           [](const CompactCell& c, bool relaxed) {
+             return array(c.stiffness(relaxed), {3, 3, 3, 3});
+           })
+      .def("unbalanced_force", &CompactCell::unbalanced_force)
+      .def("follow_network", &CompactCell::follow_network)
+      .def("report", &report)
+      .def("info", &info)
+      .def_property_readonly("contacts", &CompactCell::contacts)
+      .def_property_readonly("memory", &CompactCell::memory)
+      .def("__len__", &CompactCell::size);
+}

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "compact_block.hpp"
+
+namespace femxdem {
+
+/// C = A B, sums as everywhere in the step: a0 b0 + (a1 b1 + a2 b2).
+Row3 product(const Row3& A, const Row3& B);
+/// By the first column's minors in YADE's order.
+double determinant(const Row3& A);
+Row3 inverse(const Row3& A);
+
+/// The list of pairs that may come to touch, made anew. Throws std::runtime_error with the sentence when the cell has
+/// become too narrow for its largest spheres.
+void make_list(CompactBlock& block);
+
+/// One DEM step from rest to rest: integrator, cell, list, contacts. Throws what make_list throws.
+void step(CompactBlock& block);
+
+/// The class of contacts that form with that tangent of the friction angle.
+std::uint32_t class_of_new(const CompactArrays& arrays, double tangent);
+
+}  // namespace femxdem

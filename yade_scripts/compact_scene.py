@@ -1,0 +1,214 @@
+"""Between YADE's scenes and the compact cell (bridge/compact_cell.hpp), which makes YADE's step over arrays.
+
+Both rest inside a step, after the contact forces and before the integrator (volume_element.Engine). The format of an
+export is told in bridge/compact_scene.hpp.
+"""
+
+import math
+from operator import attrgetter, methodcaller
+
+import numpy as np
+
+import contact_laws
+
+MAGIC = b"fxdscene"
+VERSION = 1
+COHESIVE, FRICTION = 0, 1
+LAWS = {
+    ("ScGeom6D", "CohFrictPhys", "Law2_ScGeom6D_CohFrictPhys_CohesionMoment"): COHESIVE,
+    ("ScGeom", "FrictPhys", "Law2_ScGeom_FrictPhys_CundallStrack"): FRICTION,
+}
+ENGINES = ["ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator"]
+# What every object of a covered scene says of itself, where it has such an attribute.
+FUNCTORS = {
+    "interactionDetectionFactor": 1.0,
+    "avoidGranularRatcheting": True,
+    "creep": False,
+    "setCohesionNow": False,
+    "setCohesionOnNewContacts": False,
+    "frictAngle": None,
+    "neverErase": False,
+    "sphericalBodies": True,
+    "always_use_moment_law": False,
+    "shear_creep": False,
+    "twist_creep": False,
+    "traceEnergy": False,
+}
+MATERIALS = {"momentRotationLaw": False}
+STATES = {"blockedDOFs": "", "isDamped": True}
+CONTACTS = {"momentRotationLaw": False, "cohesionDisablesFriction": False, "initCohesion": False}
+INTEGRATOR = {"mask": -1, "kinSplit": False}
+
+
+def covered(O):
+    """None, or the sentence why the compact engine does not cover the scene of `O`."""
+    names = [type(e).__name__ for e in O.engines]
+    if names != ENGINES:
+        return f"it runs the engines {', '.join(names)}, and the compact engine knows only {', '.join(ENGINES)}"
+    return _functors(O.engines[2]) or _grains(O) or _contacts(O) or _state(O)
+
+
+def _functors(loop):
+    functors = [d.functors for d in (loop.geomDispatcher, loop.physDispatcher, loop.lawDispatcher)]
+    if any(len(f) != 1 for f in functors):
+        return "its contact loop has several functors for one purpose"
+    geometry, physics, law = (f[0] for f in functors)
+    kind = _kind(loop)
+    if kind not in LAWS:
+        names = ", ".join(type(f).__name__ for f in (geometry, physics, law))
+        return f"its contacts are made by {names}"
+    for functor in (geometry, physics, law):
+        wrong = _different(functor, FUNCTORS)
+        if wrong:
+            return f"{type(functor).__name__}.{wrong}"
+    makers = [getattr(physics, name, None) for name in ("kn", "ks")]
+    if any(m is not None and (m.algo != "val" or m.matches) for m in makers) or (makers[0] is None) != (makers[1] is None):
+        return f"{type(physics).__name__} matches materials for its stiffnesses"
+    return "its contact loop has callbacks" if loop.callbacks else None
+
+
+def _kind(loop):
+    geometry, physics, law = (d.functors[0] for d in (loop.geomDispatcher, loop.physDispatcher, loop.lawDispatcher))
+    made = {
+        "Ig2_Sphere_Sphere_ScGeom6D": "ScGeom6D",
+        "Ig2_Sphere_Sphere_ScGeom": "ScGeom",
+        "Ip2_CohFrictMat_CohFrictMat_CohFrictPhys": "CohFrictPhys",
+        "Ip2_FrictMat_FrictMat_FrictPhys": "FrictPhys",
+    }
+    return made.get(type(geometry).__name__), made.get(type(physics).__name__), type(law).__name__
+
+
+def _grains(O):
+    for at, b in enumerate(O.bodies):
+        if b.id != at:
+            return "some of its bodies have been erased"
+        if type(b.shape).__name__ != "Sphere" or b.isClumpMember:
+            return f"body {b.id} is not a single sphere"
+        wrong = _different(b.state, STATES) or _different(b.mat, MATERIALS)
+        if wrong:
+            return f"body {b.id} has {wrong}"
+        if len(set(b.state.inertia)) != 1:
+            return f"body {b.id} has three moments of inertia"
+    return None if len(O.bodies) > 1 else "it has a single sphere"
+
+
+def _contacts(O):
+    for i in O.interactions:
+        if i.id1 > i.id2:
+            return f"the contact of bodies {i.id1} and {i.id2} runs from the later to the earlier"
+        wrong = _different(i.phys, CONTACTS)
+        if wrong:
+            return f"the contact of bodies {i.id1} and {i.id2} has {wrong}"
+    return None
+
+
+def _state(O):
+    newton = O.engines[-1]
+    wrong = _different(newton, INTEGRATOR)
+    if wrong:
+        return f"NewtonIntegrator.{wrong}"
+    if newton.gravity.norm() != 0 or O.trackEnergy or O.forces.getPermForceUsed():
+        return "it has gravity, permanent forces or a record of energies"
+    if not O.periodic or O.cell.homoDeform != 2:
+        return "its spheres do not follow a periodic cell (Cell.homoDeform is not 2)"
+    if O.subStep != len(O.engines) - 1:
+        return "it does not rest between its contact forces and its integrator"
+    return None
+
+
+def _different(what, values):
+    for name, value in values.items():
+        is_now = getattr(what, name, value)
+        if is_now != value:
+            return f"{name} = {is_now!r}"
+    return None
+
+
+def export(O):
+    """Everything of the scene, which covered(O) has found good, as bytes for compact_cell.CompactCell.from_scene."""
+    law = LAWS[_kind(O.engines[2])]
+    contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
+    safety = contact_laws.time_step_safety(O)
+    follows = safety is not None and contact_laws.constant_stiffness(O) is None
+    counts = [VERSION, law, len(O.bodies), len(contacts), O.iter, int(follows)]
+    parts = [np.array(counts, dtype=np.int64), _numbers(O, law, safety if follows else math.nan)]
+    parts += _sphere_arrays(O) + _contact_arrays(O, law, contacts)
+    if follows:  # of the power iteration, as in time_step.critical_time_step
+        parts.append(np.random.default_rng(0).standard_normal((2, len(O.bodies), 3)))
+    return MAGIC + b"".join(np.ascontiguousarray(p).tobytes() for p in parts)
+
+
+def _numbers(O, law, safety):
+    newton, cell, physics = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0]
+    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf, cell.velGrad, newton.prevVelGrad)]
+    new = contact_laws.adhesion_of_new_contacts(O) or (math.nan, math.nan)
+    constants = [getattr(physics, name, None) if law == FRICTION else None for name in ("kn", "ks")]
+    constants = [math.nan if maker is None else maker.val for maker in constants]
+    density = float(np.mean([b.mat.density for b in O.bodies]))
+    diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
+    solid = sum(b.state.mass for b in O.bodies) / density
+    return np.concatenate([[O.dt, newton.damping], *tensors, new, constants, [safety, density, diameter, solid]])
+
+
+def _sphere_arrays(O):
+    bodies = list(O.bodies)
+    states, materials = [b.state for b in bodies], [b.mat for b in bodies]
+    forces = [[(list(f(b.id))) for b in bodies] for f in (O.forces.f, O.forces.t)]
+    turned = [s.ori * s.refOri.inverse() for s in states]
+    return [
+        *(_vectors(states, name) for name in ("pos", "vel", "angVel")),
+        *map(np.array, forces),
+        np.array([(q[3], q[0], q[1], q[2]) for q in turned]),
+        _scalars([b.shape for b in bodies], "radius"),
+        _scalars(states, "mass"),
+        _vectors(states, "inertia")[:, 0],
+        _scalars(materials, "young"),
+        _scalars(materials, "poisson"),
+        np.array([math.tan(m.frictionAngle) for m in materials]),
+    ]
+
+
+def _contact_arrays(O, law, contacts):
+    m = len(contacts)
+    phys, geom = [i.phys for i in contacts], [i.geom for i in contacts]
+    ids = np.array([(i.id1, i.id2) for i in contacts], dtype=np.int64).reshape(m, 2)
+    shift = np.array([list(i.cellDist) for i in contacts], dtype=np.int64).reshape(m, 3)
+    cohesive = {name: np.zeros(m) for name in ("normalAdhesion", "shearAdhesion", "unp", "unpMax", "fragile", "cohesionBroken")}
+    if law == COHESIVE:
+        cohesive = {name: _scalars(phys, name) for name in cohesive}
+    kn, normal = _scalars(phys, "kn"), _vectors(geom, "normal")
+    overlap = _scalars(geom, "penetrationDepth")
+    on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, kn * (overlap - cohesive["unp"]), -cohesive["normalAdhesion"])
+    waits = np.zeros(m, dtype=np.int64)
+    if contact_laws.adhesion_of_new_contacts(O):
+        waits[:] = (_scalars(contacts, "iterMadeReal") > _last_look(O)) & (cohesive["normalAdhesion"] <= 0)
+    names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
+    return [
+        *(ids, shift, waits, kn, _scalars(phys, "ks")),
+        *(cohesive[name] for name in names),
+        _scalars(phys, "tangensOfFrictionAngle"),
+        *(cohesive[name] for name in ("fragile", "cohesionBroken")),
+        *(on_normal, _vectors(phys, "shearForce"), normal),
+    ]
+
+
+def _last_look(O):
+    """Contacts made real after that step number become adhesive at the next look (contact_laws.run)."""
+    every = contact_laws.EVERY
+    return (O.iter // every + 1) * every - 2 * every
+
+
+def _normal_forces(forces, normal, elastic, adhesion):
+    """(m,) what times the normal is the force, to the bit: the elastic force, that of the plateau in tension, or none."""
+    found = np.einsum("ci,ci->c", forces, normal)
+    for guess in (np.zeros(len(forces)), adhesion, elastic):
+        found = np.where((guess[:, None] * normal == forces).all(axis=1), guess, found)
+    return found
+
+
+def _scalars(objects, name):
+    return np.fromiter(map(attrgetter(name), objects), float, len(objects))
+
+
+def _vectors(objects, name):
+    return np.array([tuple(v) for v in map(attrgetter(name), objects)]).reshape(len(objects), 3)
