@@ -71,6 +71,9 @@ class CompactCell {
   std::array<double, 9> stress() const;
   /// Deformation gradient of the cell from the reference (adopted) state.
   std::array<double, 9> stretch() const;
+  /// What judges and counts a trial: dem_steps, seconds, engine_seconds, unbalanced_force, contacts, coordination,
+  /// inertial_number, time_step, porosity, stress_asymmetry; NaN in the rest.
+  PointReport trial_report() const;
   /// All of kReportFields; "seconds" and "engine_seconds" are those of the last deform. Contacts that slide or adhere
   /// are of now.
   PointReport report() const;

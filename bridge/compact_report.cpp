@@ -91,8 +91,6 @@ double mean_rotation(const CompactArrays& a) {
 
 void report_network(const CompactArrays& a, PointReport& r) {
   const double m = a.header->contacts;
-  r["contacts"] = m;
-  r["coordination"] = 2 * m / a.header->spheres;
   r["coordination_backbone"] = coordination_of_backbone(a);
   const std::array<double, 6> F = fabric(a);
   std::size_t k = 0;
@@ -143,22 +141,30 @@ double unbalanced_force(const CompactArrays& a) {
   return resultants / h.spheres / (forces / std::max(h.contacts, 1U));
 }
 
-PointReport report(const CompactArrays& a, const CompactTrial& trial) {
+PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   const CompactHeader& h = *a.header;
   PointReport r;
-  report_network(a, r);
+  r.values.fill(std::numeric_limits<double>::quiet_NaN());
   const Row3 s = love_weber(a);
   Row3 skew;
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t k = 0; k < 3; ++k) skew[3 * i + k] = s[3 * i + k] - s[3 * k + i];
+  r["contacts"] = h.contacts;
+  r["coordination"] = 2.0 * h.contacts / h.spheres;
   r["stress_asymmetry"] = norm(skew) / std::max(2 * norm(s), 1e-300);
   r["inertial_number"] = trial.rate * time_scale(h, pressure(s));
   r["unbalanced_force"] = unbalanced_force(a);
   r["porosity"] = 1 - h.solid_volume / determinant(h.H);
-  r["mean_rotation"] = mean_rotation(a);
-  r["time_step"] = h.time_step;
+  r["time_step"] = h.time_step / h.in_a_second;
   r["dem_steps"] = trial.steps;
   r["seconds"] = r["engine_seconds"] = trial.seconds;
+  return r;
+}
+
+PointReport report(const CompactArrays& a, const CompactTrial& trial) {
+  PointReport r = trial_report(a, trial);
+  report_network(a, r);
+  r["mean_rotation"] = mean_rotation(a);
   return r;
 }
 

@@ -19,6 +19,9 @@ double pressure(const Row3& stress);
 double time_scale(const CompactHeader& header, double pressure);
 /// Mean resultant on a sphere over mean contact force.
 double unbalanced_force(const CompactArrays& arrays);
+/// What judges and counts a trial; NaN in the rest.
+PointReport trial_report(const CompactArrays& arrays, const CompactTrial& trial);
+/// All of it.
 PointReport report(const CompactArrays& arrays, const CompactTrial& trial);
 /// The contacts as springs.
 std::vector<Spring> springs(const CompactArrays& arrays);

@@ -66,7 +66,7 @@ void header_numbers(Stream& s, Header& h) {
   for (auto* tensor : {&h.H, &h.trsf, &h.L, &h.previous_L})
     for (auto& number : *tensor) s.template number<double>(number);
   for (auto* number : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
-                       &h.mean_diameter, &h.solid_volume})
+                       &h.mean_diameter, &h.solid_volume, &h.in_a_second})
     s.template number<double>(*number);
 }
 

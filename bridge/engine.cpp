@@ -91,6 +91,25 @@ void Engine::remove(int ve) {
   in_python([&] { engine_.attr("remove")(ve); });
 }
 
+Engine::Export Engine::export_scene(const std::string& state) {
+  return in_python([&] {
+    const py::object answer = engine_.attr("export_scene")(py::bytes(state));
+    const bool covered = py::isinstance<py::bytes>(answer);
+    return Export{covered, py::cast<std::string>(answer)};
+  });
+}
+
+void Engine::write_back(int ve, std::string_view exported) {
+  in_python([&] { engine_.attr("write_back")(ve, py::bytes(exported.data(), exported.size())); });
+}
+
+std::string Engine::referee(int ve, std::string_view exported, std::array<double, 9> L, long steps) {
+  return in_python([&] {
+    const py::bytes bytes(exported.data(), exported.size());
+    return py::cast<std::string>(engine_.attr("referee")(ve, bytes, view(L).attr("reshape")(3, 3), py::int_(steps)));
+  });
+}
+
 VeInfo Engine::info(int ve) {
   return in_python([&] {
     const py::dict info = engine_.attr("info")(ve);

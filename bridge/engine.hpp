@@ -3,7 +3,9 @@
 #include <pybind11/embed.h>
 #include <sys/types.h>
 
+#include <array>
 #include <string>
+#include <string_view>
 
 #include "worker_protocol.hpp"
 
@@ -27,6 +29,13 @@ class Engine {
   void replace(int ve, const std::string& state);
   std::string save(int ve);
   void remove(int ve);
+  struct Export {
+    bool covered = false;
+    std::string bytes;  ///< or the sentence why not
+  };
+  Export export_scene(const std::string& state);
+  void write_back(int ve, std::string_view exported);
+  std::string referee(int ve, std::string_view exported, std::array<double, 9> velocity_gradient, long steps);
   VeInfo info(int ve);
   /// Holds the slot's velocity gradient for its number of steps.
   void deform(int ve, Slot& slot);

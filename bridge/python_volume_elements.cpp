@@ -4,7 +4,9 @@
 
 #include <stdexcept>
 
+#include "compact_cell.hpp"
 #include "errors.hpp"
+#include "hash.hpp"
 
 namespace femxdem {
 namespace {
@@ -66,7 +68,7 @@ std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F,
   if (size() == 0) return responses;
   std::vector<Straining> plans;
   for (std::size_t i = 0; i < size(); ++i) {
-    plans.push_back(plan(i, F[i]));
+    plans.push_back(plan(i, quantised(F[i])));
     worker_.slot(i).task = plans[i].refusal ? Task::skip : Task::deform;
     responses[i].failure = plans[i].refusal;
   }
@@ -179,9 +181,16 @@ void PythonVolumeElements::load(const SavedStates& states) {
     throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
   drop_trial();
   for (std::size_t i = 0; i < size(); ++i) {
+    const StrainedPoint& point = points_[i];
     const VeState state =
-        decode(states[i]).value_or(VeState{EngineKind::yade, points_[i].reference_time_scale, states[i]});
-    worker_.request(Command::load, static_cast<std::int64_t>(i), 0, state.bytes);
+        decode(states[i]).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, states[i]});
+    const bool compact = state.engine == EngineKind::compact;
+    if (compact && state.origin != point.origin)
+      throw UserError(
+          "checkpoint: a volume element was made from another packing than the case's; restart with the packings that "
+          "it was run with (ve.cache)");
+    worker_.request(compact ? Command::write_back : Command::load, static_cast<std::int64_t>(i), 0,
+                    compact ? CompactCell::load(state.bytes).to_scene() : state.bytes);
     points_[i].reference_time_scale = state.reference_time_scale;
     adopt_state(i);
   }

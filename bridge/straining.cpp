@@ -39,10 +39,6 @@ NetworkLevel network_level(const Tensor2& stretch, const Tensor2& stress) {
   return {static_cast<int>(strain / 0.02), static_cast<int>(level)};
 }
 
-Tensor2 quantised(const Tensor2& F) {
-  return F.unaryExpr([](double value) { return std::nearbyint(value / kQuantum) * kQuantum; });
-}
-
 Straining plan_straining(const VolumeElementOptions& options, StrainedPoint& point, double time_step, std::size_t index,
                          const Tensor2& F) {
   Straining plan;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "equal_histories.hpp"
 #include "material_points.hpp"
 
 namespace femxdem {
@@ -33,6 +35,7 @@ struct StrainedPoint {
   Tensor2 stretch = Tensor2::Identity();  ///< committed deformation gradient of the cell
   NetworkLevel level{};                   ///< committed
   double reference_time_scale = 0;        ///< a sqrt(rho / p) of the state that the case starts from [s]
+  std::uint64_t origin = 0;               ///< which state that is: its hash
   long frozen_steps = 0;                  ///< of this load step's trials; 0: to be chosen at the next one
 };
 
@@ -44,10 +47,6 @@ struct Straining {
   long steps = 0;
   std::optional<Failure> refusal;
 };
-
-/// F is followed up to this: points whose histories differ by round-off alone then ask for the same to the bit.
-inline constexpr double kQuantum = 1.0 / (1LL << 40);
-Tensor2 quantised(const Tensor2& F);
 
 /// The straining that takes volume element `index` from its committed stretch to F = R U along the stretch only:
 /// L = (U_inc^(1/n) - I) / dt, U_inc = U U_n^-1. The number of steps n = max(min_steps, |ln U_inc| / (rate dt)), rate =

@@ -14,11 +14,14 @@ constexpr std::uint32_t kVersion = 1;
 
 }  // namespace
 
+std::string name_of(EngineKind engine) { return engine == EngineKind::yade ? "yade" : "compact"; }
+
 std::string encode(const VeState& state) {
   PacketWriter packet;
   packet.put(kVersion);
   packet.put(static_cast<std::int32_t>(state.engine));
   packet.put(state.reference_time_scale);
+  packet.put(state.origin);
   packet.put(std::string_view(state.bytes));
   const std::string content = packet.take();
   PacketWriter checked;
@@ -46,6 +49,7 @@ std::optional<VeState> decode(std::string_view bytes) {
     VeState state;
     state.engine = static_cast<EngineKind>(packet.get<std::int32_t>());
     state.reference_time_scale = packet.get<double>();
+    state.origin = packet.get<std::uint64_t>();
     state.bytes = packet.get_text();
     return state;
   } catch (const std::out_of_range&) {

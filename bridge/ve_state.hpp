@@ -10,11 +10,14 @@ namespace femxdem {
 /// Which engine a state belongs to.
 enum class EngineKind : std::int32_t { yade, compact };
 
+std::string name_of(EngineKind engine);
+
 /// A volume element's committed state as it travels, to a checkpoint or to another rank: with it goes whatever decides
 /// its next answer.
 struct VeState {
   EngineKind engine = EngineKind::yade;
   double reference_time_scale = 0;  ///< see StrainedPoint [s]
+  std::uint64_t origin = 0;         ///< of the scene that it was made as: the hash of that state
   std::string bytes;                ///< the engine's own
 };
 

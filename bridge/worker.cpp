@@ -68,7 +68,8 @@ void Worker::serve() {
 
 void Worker::answer(const Message& message) {
   const bool changes_states = message.command == Command::add || message.command == Command::remove ||
-                              message.command == Command::save || message.command == Command::load;
+                              message.command == Command::save || message.command == Command::load ||
+                              message.command == Command::write_back || message.command == Command::referee;
   if (changes_states) snapshot_.clear();
   switch (message.command) {
     case Command::versions:
@@ -89,6 +90,12 @@ void Worker::answer(const Message& message) {
       return save(message);
     case Command::load:
       return load(message);
+    case Command::export_scene:
+      return export_scene(message);
+    case Command::write_back:
+      return write_back(message);
+    case Command::referee:
+      return referee(message);
     case Command::quit:
       return;
   }
@@ -111,6 +118,27 @@ void Worker::remove(const Message& message) {
   ves_.erase(ves_.begin() + message.a);
   for (std::size_t i = index; i < ves_.size(); ++i) batch_.slots[i] = batch_.slots[i + 1];
   reply(message, ReplyKind::done);
+}
+
+void Worker::export_scene(const Message& message) {
+  const Engine::Export made = engine_.export_scene(get_mail(kMailDescriptor, message.mail));
+  reply(message, ReplyKind::done, made.covered, put_mail(kMailDescriptor, made.bytes));
+}
+
+void Worker::write_back(const Message& message) {
+  const auto index = static_cast<std::size_t>(message.a);
+  engine_.write_back(ves_.at(index), get_mail(kMailDescriptor, message.mail));
+  refresh(index);
+  reply(message, ReplyKind::done);
+}
+
+void Worker::referee(const Message& message) {
+  const std::string task = get_mail(kMailDescriptor, message.mail);
+  std::array<double, 9> L;
+  std::memcpy(L.data(), task.data(), sizeof L);
+  const std::string end = engine_.referee(ves_.at(static_cast<std::size_t>(message.a)),
+                                          std::string_view(task).substr(sizeof L), L, message.b);
+  reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, end));
 }
 
 void Worker::save(const Message& message) {

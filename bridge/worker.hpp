@@ -32,6 +32,9 @@ class Worker {
   void save(const Message& message);
   void load(const Message& message);
   void remove(const Message& message);
+  void export_scene(const Message& message);
+  void write_back(const Message& message);
+  void referee(const Message& message);
   void commit_in_process(const Message& message);
   void reject_in_process();
 

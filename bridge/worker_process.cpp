@@ -36,7 +36,7 @@ std::filesystem::path find_executable(const std::filesystem::path& given) {
 /// Environment of the worker: one thread, nothing of our MPI, nothing that moves Python's own folders. CHOLMOD asks
 /// OpenMP for four threads whatever OMP_NUM_THREADS says, and a trial, being a fork, waits for ever for those of its
 /// parent: the limit leaves none.
-std::vector<std::string> worker_environment() {
+std::vector<std::string> worker_environment(bool sorted_contacts) {
   std::vector<std::string> kept;
   for (char** entry = environ; *entry; ++entry) {
     const std::string_view text = *entry;
@@ -48,6 +48,7 @@ std::vector<std::string> worker_environment() {
   }
   kept.emplace_back("OMP_NUM_THREADS=1");
   kept.emplace_back("OMP_THREAD_LIMIT=1");
+  if (sorted_contacts) kept.emplace_back("FEMXDEM_SORTED_CONTACTS=1");
   return kept;
 }
 
@@ -115,7 +116,7 @@ void WorkerProcess::start() {
   std::vector<std::string> arguments = {command_.executable.string(), command_.engine,
                                         std::filesystem::absolute(command_.python_path).string(),
                                         std::to_string(getpid())};
-  std::vector<std::string> environment = worker_environment();
+  std::vector<std::string> environment = worker_environment(command_.sorted_contacts);
   const std::vector<char*> argv = pointers(arguments), envp = pointers(environment);
   pid_ = fork();
   if (pid_ < 0) throw system_error("worker: cannot be started");

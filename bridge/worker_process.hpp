@@ -20,6 +20,7 @@ struct WorkerCommand {
   std::filesystem::path executable;              ///< empty: femxdem-worker beside this program, else that of the build
   std::string engine = "volume_element:Engine";  ///< Python module:class, see yade_scripts/protocol.py
   std::filesystem::path python_path;             ///< folder of the engine's module; empty: yade_scripts of the sources
+  bool sorted_contacts = false;                  ///< contacts are looped over in the order of their spheres
   double point_timeout = 1800;                   ///< a volume element that works longer on one trial is ended [s]
   double template_timeout = 7200;                ///< the same for a preparation or a user's script [s]
 };

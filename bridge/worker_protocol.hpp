@@ -29,6 +29,11 @@ enum class Command : std::uint32_t {
   reject,         ///< the trial is given up; no reply
   save,           ///< a: index; mail out: state, from which the volume element goes on
   load,           ///< a: index; mail in: state
+  export_scene,   ///< mail in: state; reply value 1 and mail out: what CompactCell::from_scene takes; or 0 and the
+                  ///< sentence why compact cells do not cover it
+  write_back,     ///< a: index; mail in: what CompactCell::to_scene gave: the volume element becomes it
+  referee,        ///< a: index, b: steps; mail in: velocity gradient (9 numbers), then as write_back: strained with the
+                  ///< contacts in the order of their spheres; mail out: its export
   quit            ///< no reply
 };
 

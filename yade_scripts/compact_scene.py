@@ -10,6 +10,7 @@ from operator import attrgetter, methodcaller
 import numpy as np
 
 import contact_laws
+import unit_of_time
 
 MAGIC = b"fxdscene"
 VERSION = 1
@@ -130,7 +131,7 @@ def export(O):
     contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
     safety = contact_laws.time_step_safety(O)
     follows = safety is not None and contact_laws.constant_stiffness(O) is None
-    counts = [VERSION, law, len(O.bodies), len(contacts), O.iter, int(follows)]
+    counts = [VERSION, law, len(O.bodies), len(contacts), contact_laws.steps_made(O), int(follows)]
     parts = [np.array(counts, dtype=np.int64), _numbers(O, law, safety if follows else math.nan)]
     parts += _sphere_arrays(O) + _contact_arrays(O, law, contacts)
     if follows:  # of the power iteration, as in time_step.critical_time_step
@@ -144,10 +145,11 @@ def _numbers(O, law, safety):
     new = contact_laws.adhesion_of_new_contacts(O) or (math.nan, math.nan)
     constants = [getattr(physics, name, None) if law == FRICTION else None for name in ("kn", "ks")]
     constants = [math.nan if maker is None else maker.val for maker in constants]
+    unit = unit_of_time.of(O)
     density = float(np.mean([b.mat.density for b in O.bodies]))
     diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
     solid = sum(b.state.mass for b in O.bodies) / density
-    return np.concatenate([[O.dt, newton.damping], *tensors, new, constants, [safety, density, diameter, solid]])
+    return np.concatenate([[O.dt, newton.damping], *tensors, new, constants, [safety, unit.density(density), diameter, solid, unit.in_a_second]])
 
 
 def _sphere_arrays(O):
@@ -181,7 +183,7 @@ def _contact_arrays(O, law, contacts):
     on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, kn * (overlap - cohesive["unp"]), -cohesive["normalAdhesion"])
     waits = np.zeros(m, dtype=np.int64)
     if contact_laws.adhesion_of_new_contacts(O):
-        waits[:] = (_scalars(contacts, "iterMadeReal") > _last_look(O)) & (cohesive["normalAdhesion"] <= 0)
+        waits[:] = (_scalars(contacts, "iterMadeReal") >= contact_laws.last_look(O)) & (cohesive["normalAdhesion"] <= 0)
     names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     return [
         *(ids, shift, waits, kn, _scalars(phys, "ks")),
@@ -190,12 +192,6 @@ def _contact_arrays(O, law, contacts):
         *(cohesive[name] for name in ("fragile", "cohesionBroken")),
         *(on_normal, _vectors(phys, "shearForce"), normal),
     ]
-
-
-def _last_look(O):
-    """Contacts made real after that step number become adhesive at the next look (contact_laws.run)."""
-    every = contact_laws.EVERY
-    return (O.iter // every + 1) * every - 2 * every
 
 
 def _normal_forces(forces, normal, elastic, adhesion):

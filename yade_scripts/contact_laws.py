@@ -126,6 +126,11 @@ def steps_made(O):
     return O.iter - _looks(O)[0]
 
 
+def last_look(O):
+    """YADE's count of steps at the last look for new contacts: those made real since become adhesive at the next."""
+    return _looks(O)[1]
+
+
 def _looks(O):
     """Steps that restoring has added to YADE's count, and that count at the last look for new contacts."""
     noted = _noted(O, LOOKS_TAG)
@@ -167,6 +172,12 @@ def run(O, steps, new_adhesion):
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
             last = O.iter
     _note(O, LOOKS_TAG, added, last)
+
+
+def loop_in_order(O):
+    """Forces are summed in the order of the spheres' numbers, as compact cells do it: slower, the same bits."""
+    loop = next(e for e in O.engines if type(e).__name__ == "InteractionLoop")
+    loop.loopOnSortedInteractions = True
 
 
 def resting_time_step(O):

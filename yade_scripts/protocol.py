@@ -13,6 +13,11 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     replace(ve, state)                 VE number `ve` becomes that state
     save(ve) -> bytes                  its state; add(save(ve)) continues bit-equal to replace(ve, save(ve))
     remove(ve)
+    export_scene(state)                what bridge/compact_scene.hpp takes as bytes, or the sentence why compact cells do not
+                                       cover the state
+    write_back(ve, exported)           VE number `ve`, made from the same scene, becomes what a compact cell gave back
+    referee(ve, exported, velocity_gradient, steps) -> bytes   write_back, then deform with the contacts in the order of their
+                                       spheres; the export of the end
     info(ve) -> dict                   {"time_step": s, "time_scale": a sqrt(rho/p) s, "volume": m^3, "spheres": n,
                                         "mean_diameter": m, "mean_stress": Pa (compression positive)}
     deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's
@@ -79,6 +84,9 @@ class DummyEngine:
 
     def remove(self, ve):
         del self.cells[ve]
+
+    def export_scene(self, state):
+        return "it is a dummy"
 
     def info(self, ve):
         return {

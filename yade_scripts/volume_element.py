@@ -1,6 +1,7 @@
 """The engine of protocol.py on YADE: volume elements as resident scenes."""
 
 import math
+import os
 import time
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -9,6 +10,7 @@ from operator import methodcaller
 import numpy as np
 
 import adoption
+import compact_scene
 import contact_laws
 import contact_loop
 import packing
@@ -117,11 +119,31 @@ class Engine:
         self._to_forces()
         contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
+        if os.environ.get("FEMXDEM_SORTED_CONTACTS"):
+            contact_laws.loop_in_order(O)
         self._trial[ve], self._grains[ve] = _Trial(), _grains(O)
 
     def save(self, ve):
         self._select(ve)
         return self.O.sceneToString()
+
+    def export_scene(self, state):
+        ve = self.add(state)
+        why_not = compact_scene.covered(self.O)
+        exported = why_not or compact_scene.export(self.O)
+        self.remove(ve)
+        return exported
+
+    def write_back(self, ve, exported):
+        self._select(ve)
+        compact_scene.write_back(self.O, exported)
+        self._trial[ve], self._grains[ve] = _Trial(), _grains(self.O)
+
+    def referee(self, ve, exported, velocity_gradient, steps):
+        self.write_back(ve, exported)
+        contact_laws.loop_in_order(self.O)
+        self.deform(ve, velocity_gradient, steps)
+        return compact_scene.export(self.O)
 
     def remove(self, ve):
         self._select(ve)

@@ -170,7 +170,15 @@ Section<VeParameters> ve_section() {
                      "an answer above is refused as unstable"),
            word("stiffness", &V::stiffness, {"affine", "relaxed"},
                 "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium"),
-           word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial leaves the committed state alone"),
+           word("engine", &V::engine, {"auto", "yade", "compact"},
+                "what strains it: YADE, or compact cells, which make YADE's step to the bit; auto: compact where they can"),
+           parameter("check_every", &V::check_every, "", kNotNegative,
+                     "one trial of compact cells in so many is repeated in YADE; 0: about 20 in a run"),
+           parameter("threads", &V::threads, "", kNotNegative,
+                     "of a rank, for compact cells; 0: the processors that it may use"),
+           parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
+                     "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
+           word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),
            parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
            word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
            parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
@@ -348,7 +356,7 @@ const CaseSections& case_sections() {
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
     s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"preset", "stiffness", "snapshot", "inertial_number", "min_steps", "freeze_steps",
+                            {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot", "inertial_number", "min_steps", "freeze_steps",
                              "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
     return s;
   }();

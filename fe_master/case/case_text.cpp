@@ -104,6 +104,9 @@ void describe(std::string& out, const Section<S>& section, bool array) {
 void forget_places(VeParameters& ve) {
   ve.script = hash_text(read_file(ve.script));
   ve.scene = hash_text(read_file(ve.scene));
+  ve.engine = {};
+  ve.check_every = ve.threads = 0;
+  ve.sorted_contacts = false;
   ve.cache.clear();
 }
 

@@ -12,7 +12,7 @@ namespace femxdem {
 namespace {
 
 std::string header(const std::vector<std::string>& monitors) {
-  std::string line = "step,time,load_factor,iterations,evaluations,dem_steps,residual";
+  std::string line = "step,time,load_factor,iterations,evaluations,dem_steps,histories,residual";
   for (const std::string& name : monitors) line += "," + name;
   return line + ",dem_seconds,wall_s\n";
 }
@@ -47,8 +47,8 @@ History::History(const std::filesystem::path& file, const std::vector<std::strin
 void History::add(const StepRecord& record) {
   assert(record.monitors.size() == monitors_);
   std::string row =
-      fmt::format("{},{:.17g},{:.17g},{},{},{:.17g},{:.17g}", record.step, record.time, record.load_factor,
-                  record.iterations, record.evaluations, record.dem_steps, record.residual);
+      fmt::format("{},{:.17g},{:.17g},{},{},{:.17g},{},{:.17g}", record.step, record.time, record.load_factor,
+                  record.iterations, record.evaluations, record.dem_steps, record.histories, record.residual);
   for (const double value : record.monitors) row += fmt::format(",{:.17g}", value);
   row += fmt::format(",{:.6g},{:.6g}\n", record.dem_seconds, record.wall_seconds);
   stream_ << row << std::flush;

@@ -17,6 +17,7 @@ struct StepRecord {
   int iterations = 0;
   int evaluations = 0;           ///< of all material points, spent on this step, rejected trials included
   double dem_steps = 0;          ///< of all points and evaluations of this step
+  std::size_t histories = 0;     ///< different ones among the points (EqualHistories)
   double residual = 0;           ///< relative force residual that was accepted [-]
   double dem_seconds = 0;        ///< inside the DEM engine, all ranks, this step [s]
   double wall_seconds = 0;       ///< since the start of the run [s]

@@ -48,7 +48,7 @@ std::string object(const Members& members, std::string_view indent) {
 }  // namespace
 
 std::string to_json(const Summary& summary, const std::string& date, const std::string& host) {
-  const double capacity = summary.ranks * summary.evaluate_seconds;
+  const double capacity = summary.ranks * summary.threads * summary.evaluate_seconds;
   Members versions;
   for (const auto& [name, version] : summary.versions) versions.emplace_back(name, json_string(version));
   const Members members = {
@@ -59,6 +59,9 @@ std::string to_json(const Summary& summary, const std::string& date, const std::
       {"evaluations", number(static_cast<double>(summary.evaluations))},
       {"dem_steps", number(summary.dem_steps)},
       {"ranks", number(summary.ranks)},
+      {"threads", number(summary.threads)},
+      {"engine", json_string(summary.engine)},
+      {"engine_check", json_string(summary.engine_check)},
       {"wall_seconds", number(summary.wall_seconds)},
       {"evaluate_seconds", number(summary.evaluate_seconds)},
       {"trial_seconds", number(summary.trial_seconds)},

@@ -79,6 +79,8 @@ class MaterialPoints {
   virtual ~MaterialPoints() = default;
   /// Number of points of the batch.
   virtual std::size_t size() const = 0;
+  /// How many different histories the last trial has made of them (EqualHistories).
+  virtual std::size_t distinct() const { return size(); }
   /// A new load step starts (also after a cut): whatever is frozen during a step's iterations, such as the number of
   /// DEM steps of a point, is chosen anew at the next evaluate.
   virtual void begin_step() {}
@@ -96,6 +98,11 @@ class MaterialPoints {
   virtual void load(const SavedStates& states) = 0;
 };
 
+/// How often a second engine has repeated trials, and how often it has ended in the same state.
+struct EngineCheck {
+  long trials = 0, equal = 0;
+};
+
 /// The material points that one rank serves; the bridge's volume elements, or a law in closed form in tests.
 class LocalPoints : public MaterialPoints {
  public:
@@ -109,6 +116,9 @@ class LocalPoints : public MaterialPoints {
   virtual void remove(std::size_t point) = 0;
   /// The committed state of one point, see save().
   virtual std::string save_one(std::size_t point) = 0;
+  virtual EngineCheck engine_check() const { return {}; }
+  /// That work on them.
+  virtual int threads() const { return 1; }
   /// Largest memory so far of what stands behind the points [byte].
   virtual std::uint64_t peak_memory() const = 0;
 };

@@ -12,6 +12,7 @@ enum class ContactLaw { adhesive, bonded, friction };
 enum class NewContacts { frictional, adhesive };
 enum class Snapshot { fork, serialise };
 enum class VeStiffness { affine, relaxed };
+enum class EngineChoice { automatic, yade, compact };
 enum class Assignment { same, random };
 struct VeParameters {
   VePreset preset = VePreset::none;  ///< gives spheres and inertial_number where the case does not
@@ -40,6 +41,10 @@ struct VeParameters {
   NewContacts new_contacts = NewContacts::frictional;
   VeStiffness stiffness = VeStiffness::affine;
   Snapshot snapshot = Snapshot::fork;
+  EngineChoice engine = EngineChoice::automatic;  ///< compact cells where they cover the scene and equal YADE's bits
+  int check_every = 0;           ///< one trial of compact cells in so many is repeated in YADE; 0: about 20 a run
+  int threads = 0;               ///< of a rank, for compact cells; 0: the processors that it may use
+  bool sorted_contacts = false;  ///< YADE sums forces in the order of the spheres, as compact cells do: slower, same bits
   std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
   Assignment assignment = Assignment::same;  ///< of the pool to the elements
   int assignment_seed = 1;

@@ -14,7 +14,7 @@
 namespace femxdem {
 namespace {
 
-enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, peak_memory, end };
+enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, account, end };
 enum class Verdict : std::int32_t { done, user_error, error };
 
 constexpr int kTag = 0;
@@ -162,9 +162,13 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local)
     case Order::load:
       load(local, PacketReader(input));
       break;
-    case Order::peak_memory:
+    case Order::account: {
+      const EngineCheck check = local.engine_check();
       output.put(local.peak_memory());
+      output.put(check.trials);
+      output.put(check.equal);
       break;
+    }
     case Order::end:
       break;
   }
@@ -220,7 +224,11 @@ std::vector<std::string> command(MPI_Comm communicator, Order order, const std::
 
 VolumeElements::VolumeElements(MPI_Comm communicator, LocalPoints& local, const std::vector<std::string>& templates,
                                const std::vector<int>& template_of_point)
-    : communicator_(communicator), local_(local), owner_(assign(template_of_point.size(), size_of(communicator))) {
+    : communicator_(communicator),
+      local_(local),
+      owner_(assign(template_of_point.size(), size_of(communicator))),
+      histories_(std::span<const int>(template_of_point)),
+      distinct_(template_of_point.size()) {
   std::vector<std::string> inputs;
   for (const auto& points : points_of_ranks()) {
     PacketWriter packet;
@@ -267,6 +275,7 @@ std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Opera
       responses[point] = get_response(packet, wanted != Operator::none, point);
     if (rank > 0) statistics_.bytes += inputs[rank].size() + answers[rank].size();
   }
+  distinct_ = histories_.trial(F);
   count(responses, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   return responses;
 }
@@ -293,6 +302,7 @@ void VolumeElements::commit() {
     for (const std::size_t point : points[rank])
       packet.get_doubles(reports_[point].values.data(), reports_[point].values.size());
   }
+  histories_.commit();
 }
 
 SavedStates VolumeElements::save() {
@@ -317,12 +327,17 @@ void VolumeElements::load(const SavedStates& states) {
     inputs.push_back(packet.take());
   }
   command(communicator_, Order::load, inputs, local_);
+  histories_ = EqualHistories(std::span<const std::string>(states));
 }
 
-std::uint64_t VolumeElements::peak_memory() {
-  std::uint64_t sum = 0;
-  for (const std::string& output : command(communicator_, Order::peak_memory, {}, local_))
-    sum += PacketReader(output).get<std::uint64_t>();
+VolumeElements::Account VolumeElements::account() {
+  Account sum;
+  for (const std::string& output : command(communicator_, Order::account, {}, local_)) {
+    PacketReader packet(output);
+    sum.peak_memory += packet.get<std::uint64_t>();
+    sum.check.trials += packet.get<long>();
+    sum.check.equal += packet.get<long>();
+  }
   return sum;
 }
 

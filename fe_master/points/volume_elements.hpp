@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "equal_histories.hpp"
 #include "material_points.hpp"
 
 namespace femxdem {
@@ -37,6 +38,7 @@ class VolumeElements : public MaterialPoints {
   VolumeElements& operator=(const VolumeElements&) = delete;
 
   std::size_t size() const override { return owner_.size(); }
+  std::size_t distinct() const override { return distinct_; }
   void begin_step() override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
@@ -45,8 +47,12 @@ class VolumeElements : public MaterialPoints {
   void load(const SavedStates& states) override;
 
   const FarmStatistics& statistics() const { return statistics_; }
-  /// Sum over the ranks of LocalPoints::peak_memory [byte]. Collective with serve().
-  std::uint64_t peak_memory();
+  /// Sums over the ranks of what LocalPoints count. Collective with serve().
+  struct Account {
+    std::uint64_t peak_memory = 0;  ///< [byte]
+    EngineCheck check;
+  };
+  Account account();
 
  private:
   std::vector<std::vector<std::size_t>> points_of_ranks() const;
@@ -56,6 +62,8 @@ class VolumeElements : public MaterialPoints {
   LocalPoints& local_;
   std::vector<int> owner_;            ///< rank of each point
   std::vector<PointReport> reports_;  ///< of the last commit
+  EqualHistories histories_;
+  std::size_t distinct_ = 0;
   FarmStatistics statistics_;
 };
 

@@ -7,9 +7,11 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "analytic_points.hpp"
 #include "case.hpp"
+#include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "time_loop.hpp"
@@ -40,17 +42,26 @@ struct Mpi {
     MPI_Init(nullptr, nullptr);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &size);
+    MPI_Comm machine;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
+    MPI_Comm_size(machine, &of_machine);
+    MPI_Comm_free(&machine);
   }
   ~Mpi() { MPI_Finalize(); }
   Mpi(const Mpi&) = delete;
   Mpi& operator=(const Mpi&) = delete;
-  /// Whether rank 0 goes on: what it found out before the ranks work together.
-  bool agree(bool go) const {
-    int flag = go;
-    MPI_Bcast(&flag, 1, MPI_INT, 0, MPI_COMM_WORLD);
-    return flag != 0;
+  /// What rank 0 tells the others before the ranks work together: a number, or that it does not go on.
+  void agree(std::optional<int> number) const {
+    int told = number.value_or(-1);
+    MPI_Bcast(&told, 1, MPI_INT, 0, MPI_COMM_WORLD);
+  }
+  std::optional<int> agreed() const {
+    int told = -1;
+    MPI_Bcast(&told, 1, MPI_INT, 0, MPI_COMM_WORLD);
+    return told < 0 ? std::nullopt : std::optional(told);
   }
   int rank = 0, size = 1;
+  int of_machine = 1;  ///< ranks that share this machine's processors
 };
 
 /// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
@@ -81,34 +92,52 @@ VeArguments ve_arguments(const Arguments& arguments) {
   return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.noise_samples};
 }
 
+/// Trials that a run will ask of its volume elements, about: three evaluations a step.
+double expected_trials(const Problem& problem) {
+  const ControlParameters& control = problem.parameters().control;
+  return 3 * control.end_time / control.max_step * static_cast<double>(problem.element().points());
+}
+
 int run_on_volume_elements(Problem& problem, RunOptions options) {
-  WorkerProcess worker({});
+  const VeParameters& ve = problem.parameters().ve;
+  WorkerProcess worker(worker_command(ve));
   const Mpi mpi;
-  VolumeElementOptions ve = ve_options(problem.parameters().ve);
-  ve.say = [rank = mpi.rank](std::string_view remark) { std::cerr << "rank " << rank << ": " << remark << std::endl; };
-  PythonVolumeElements local(worker, ve);
+  const auto local_points = [&](EngineKind engine) {
+    return make_local_points(engine, worker, ve, expected_trials(problem) / mpi.size, options.folder,
+                             mpi.of_machine);
+  };
   if (mpi.rank > 0) {
-    if (!mpi.agree(true)) return kBadInput;
-    serve(MPI_COMM_WORLD, local);
+    const auto engine = mpi.agreed();
+    if (!engine) return kBadInput;
+    serve(MPI_COMM_WORLD, *local_points(static_cast<EngineKind>(*engine)));
     return kDone;
   }
   const Problem::Start start = problem.volume_elements();
   std::vector<std::string> templates;
+  EngineVerdict verdict;
   try {
-    templates = make_templates(local, start.templates, [](std::string_view line) { std::cout << line << std::endl; });
-    options.versions.merge(engine_versions(local));
+    PythonVolumeElements maker(worker, ve_options(ve));
+    templates = make_templates(maker, start.templates, [](std::string_view line) { std::cout << line << std::endl; });
+    options.versions.merge(engine_versions(maker));
+    verdict = choose_engine(ve.engine, worker, templates);
   } catch (...) {
-    mpi.agree(false);
+    mpi.agree(std::nullopt);
     throw;
   }
-  mpi.agree(true);
+  mpi.agree(static_cast<int>(verdict.engine));
   options.ranks = mpi.size;
-  VolumeElements points(MPI_COMM_WORLD, local, templates, start.template_of_point);
+  options.remarks.push_back(verdict.sentence);
+  const auto local = local_points(verdict.engine);
+  VolumeElements points(MPI_COMM_WORLD, *local, templates, start.template_of_point);
   options.complete = [&](Summary& summary) {
+    const VolumeElements::Account account = points.account();
     summary.evaluate_seconds = points.statistics().seconds;
     summary.trial_seconds = points.statistics().trial_seconds;
     summary.engine_seconds = points.statistics().engine_seconds;
-    summary.peak_memory_workers = points.peak_memory();
+    summary.peak_memory_workers = account.peak_memory;
+    summary.threads = local->threads();
+    summary.engine = name_of(verdict.engine);
+    summary.engine_check = describe(account.check);
   };
   return run_case(problem, points, options);
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "path.hpp"
@@ -45,14 +46,30 @@ fs::path default_folder(const Case& c, const char* ending) {
   return folder;
 }
 
+/// Trials that a path will ask of its volume element, about.
+double expected_trials(const Case& c) {
+  double increments = 0;
+  for (const PathSegment& segment : c.path) increments += segment.increments;
+  return 3 * increments;
+}
+
 int path_of_volume_element(const Case& c, VeArguments& arguments) {
-  WorkerProcess worker({});
-  PythonVolumeElements point(worker, ve_options(c.ve));
-  const std::vector<std::string> states = make_templates(point, {single_ve(c)}, say);
-  arguments.options.versions.merge(engine_versions(point));
-  arguments.options.complete = [&](Summary& summary) { summary.peak_memory_workers = point.peak_memory(); };
-  point.add(states.front(), 1);
-  return follow_path(c, point, arguments.options, arguments.noise_samples);
+  WorkerProcess worker(worker_command(c.ve));
+  PythonVolumeElements maker(worker, ve_options(c.ve));
+  const std::string state = make_templates(maker, {single_ve(c)}, say).front();
+  arguments.options.versions.merge(engine_versions(maker));
+  const EngineVerdict verdict = choose_engine(c.ve.engine, worker, {state});
+  arguments.options.remarks.push_back(verdict.sentence);
+  const auto point =
+      make_local_points(verdict.engine, worker, c.ve, expected_trials(c), arguments.options.folder, 1);
+  arguments.options.complete = [&](Summary& summary) {
+    summary.peak_memory_workers = point->peak_memory();
+    summary.threads = point->threads();
+    summary.engine = name_of(verdict.engine);
+    summary.engine_check = describe(point->engine_check());
+  };
+  point->add(state, 1);
+  return follow_path(c, *point, arguments.options, arguments.noise_samples);
 }
 
 /// All volume elements of a case: those of its mesh, or of its seeds where it has none.

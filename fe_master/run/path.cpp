@@ -144,6 +144,7 @@ bool Path::step(double fraction, double time) {
   record_.time = time;
   record_.load_factor = time / static_cast<double>(case_.path.size());
   record_.iterations = static_cast<int>(table.size());
+  record_.histories = 1;
   record_.residual = last_.table.back().residual;
   record_.step = ++files_.summary.steps;
   const StepRecord row = record_;

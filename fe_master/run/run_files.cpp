@@ -11,6 +11,7 @@ RunFiles::RunFiles(const Case& c, const RunOptions& options)
   summary.case_hash = case_hash(c);
   summary.command_line = options.command_line;
   summary.versions = options.versions;
+  for (const std::string& remark : options.remarks) log.say(remark);
 }
 
 void RunFiles::begin_history(const std::vector<std::string>& columns, int last_step) {
@@ -32,7 +33,8 @@ int RunFiles::finish(int status, const std::string& message) {
   summary.peak_memory_master = peak_memory();
   options_.complete(summary);
   write_summary(options_.folder / "summary.json", summary);
-  log.say(fmt::format("{}: {}", summary.status, message));
+  const std::string check = summary.engine_check.empty() ? "" : "; " + summary.engine_check;
+  log.say(fmt::format("{}: {}{}", summary.status, message, check));
   return status;
 }
 

@@ -146,6 +146,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_.time = now.time;
   record_.load_factor = case_.control.mode == ControlMode::time ? done : now.load_factor;
   record_.iterations = last_.iterations();
+  record_.histories = points_.distinct();
   record_.residual = last_.table.back().residual;
   record_.wall_seconds = files_.wall();
   record_.monitors = monitor_values(case_, problem_.element(), now);

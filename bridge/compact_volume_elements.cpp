@@ -1,0 +1,278 @@
+#include "compact_volume_elements.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <numeric>
+#include <set>
+#include <thread>
+
+#include "errors.hpp"
+#include "hash.hpp"
+
+namespace femxdem {
+namespace {
+
+using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
+
+/// A number in [0, 1) that the trial's number and the point decide (splitmix64, Steele, Lea, Flood 2014).
+double drawn(std::uint64_t trial) {
+  std::uint64_t z = trial * 0x9e3779b97f4a7c15ull + 0x9e3779b97f4a7c15ull;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+/// Order of F, bit by bit.
+struct ByBits {
+  bool operator()(const Tensor2& a, const Tensor2& b) const { return std::memcmp(a.data(), b.data(), sizeof a) < 0; }
+};
+
+}  // namespace
+
+CompactVolumeElements::CompactVolumeElements(WorkerProcess& worker, VolumeElementOptions options,
+                                             CompactOptions compact)
+    : worker_(worker), options_(std::move(options)), compact_(std::move(compact)), referee_(worker) {}
+
+CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& state) {
+  const std::optional<VeState> saved = decode(state);
+  Point point;
+  if (saved && saved->engine == EngineKind::compact) {
+    point.cell = std::make_shared<CompactCell>(CompactCell::load(saved->bytes));
+    point.strained.origin = saved->origin;
+    point.strained.reference_time_scale = saved->reference_time_scale;
+  } else {
+    const std::string& scene = saved ? saved->bytes : state;
+    const ExportedScene exported = referee_.exported(scene);
+    if (!exported.covered)
+      throw UserError(fmt::format("volume element: the compact engine does not cover it: {}; set ve.engine = \"yade\"",
+                                  exported.bytes));
+    point.cell = std::make_shared<CompactCell>(CompactCell::from_scene(exported.bytes));
+    point.strained.origin = saved ? saved->origin : hash(scene);
+    if (!saved) referee_.add_origin(point.strained.origin, scene);
+    const VeInfo info = point.cell->info();
+    if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
+    point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
+  }
+  adopt(point);
+  return point;
+}
+
+void CompactVolumeElements::adopt(Point& point) const {
+  point.strained.stretch = tensor(point.cell->stretch());
+  point.strained.level = network_level(point.strained.stretch, tensor(point.cell->stress()));
+  point.strained.frozen_steps = 0;
+  point.time_step = point.cell->info().time_step;
+}
+
+void CompactVolumeElements::add(const std::string& state, std::size_t count) {
+  if (count == 0) return;
+  const Point point = point_of(state);
+  points_.insert(points_.end(), count, point);
+  count_memory();
+}
+
+void CompactVolumeElements::remove(std::size_t index) {
+  points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(index));
+  trial_pending_ = false;
+}
+
+void CompactVolumeElements::begin_step() {
+  for (Point& point : points_) point.strained.frozen_steps = 0;
+}
+
+std::vector<Response> CompactVolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
+  require_answerable(wanted, F.size(), size());
+  std::vector<Tensor2> followed(F.size());
+  std::vector<Straining> plans(F.size());
+  in_parallel(size(), [&](std::size_t p) {
+    followed[p] = quantised(F[p]);
+    plans[p] = plan_straining(options_, points_[p].strained, points_[p].time_step, p, followed[p]);
+  });
+  group(followed, plans);
+  const std::vector<std::size_t> order = longest_first();
+  in_parallel(order.size(), [&](std::size_t t) { strain(trials_[order[t]], wanted); });
+  count_memory();
+  for (Trial& trial : trials_) {
+    if (trial.checked) check(trial);
+  }
+  std::vector<Response> responses;
+  for (std::size_t p = 0; p < size(); ++p) {
+    responses.push_back(trials_[trial_of_point_[p]].response);
+    if (responses.back().failure) responses.back().failure->point = p;
+  }
+  trial_pending_ = true;
+  trial_failed_ = std::any_of(trials_.begin(), trials_.end(), [](const Trial& t) { return t.response.failure; });
+  return responses;
+}
+
+std::vector<std::size_t> CompactVolumeElements::longest_first() const {
+  std::vector<std::size_t> order(trials_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return trials_[a].straining.steps > trials_[b].straining.steps;
+  });
+  return order;
+}
+
+/// Points that start from the same cell and ask for the same of it make one trial.
+void CompactVolumeElements::group(std::span<const Tensor2> F, const std::vector<Straining>& plans) {
+  for (Trial& trial : trials_) spare_.push_back(std::move(trial.cell));
+  std::erase_if(spare_, [](const Cell& cell) { return cell == nullptr || cell.use_count() > 1; });
+  trials_.clear();
+  trial_of_point_.assign(size(), 0);
+  std::map<std::pair<const CompactCell*, long>, std::map<Tensor2, std::size_t, ByBits>> known;
+  for (std::size_t p = 0; p < size(); ++p) {
+    auto& of_cell = known[{points_[p].cell.get(), plans[p].steps}];
+    const auto [entry, added] = of_cell.try_emplace(F[p], trials_.size());
+    trial_of_point_[p] = entry->second;
+    if (!added) continue;
+    Trial& trial = trials_.emplace_back();
+    trial.first = p;
+    trial.straining = plans[p];
+    trial.response.failure = plans[p].refusal;
+    if (trial.response.failure) continue;
+    trial.cell = spare_cell();
+    trial.checked = referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
+  }
+}
+
+CompactVolumeElements::Cell CompactVolumeElements::spare_cell() {
+  if (spare_.empty()) return std::make_shared<CompactCell>();
+  Cell cell = std::move(spare_.back());
+  spare_.pop_back();
+  return cell;
+}
+
+/// The work of `count` items by the threads of this rank; items are taken in order, as threads become free.
+template <class Work>
+void CompactVolumeElements::in_parallel(std::size_t count, Work work) const {
+  std::atomic<std::size_t> next{0};
+  const auto serve = [&] {
+    for (std::size_t item = next++; item < count; item = next++) work(item);
+  };
+  std::vector<std::jthread> helpers;
+  for (std::size_t t = 1; t < std::min<std::size_t>(static_cast<std::size_t>(compact_.threads), count); ++t)
+    helpers.emplace_back(serve);
+  serve();
+}
+
+void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
+  if (trial.response.failure) return;
+  const Point& point = points_[trial.first];
+  CompactCell& cell = *trial.cell;
+  cell = *point.cell;
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps);
+  if (end.failure) {
+    trial.response.failure = Failure{trial.first, *end.failure, kSmallerStep};
+    return;
+  }
+  trial.response.report = cell.trial_report();
+  Strained found{tensor(cell.stress()), tensor(cell.stretch()), {}};
+  if (wanted == Operator::elastic)
+    found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
+  judge(options_, trial.straining, trial.first, found, trial.response);
+}
+
+void CompactVolumeElements::check(const Trial& trial) {
+  if (trial.response.failure) return;
+  const Point& point = points_[trial.first];
+  ++check_.trials;
+  const auto difference = referee_.difference(point.strained.origin, *point.cell, trial.straining, *trial.cell);
+  if (!difference) {
+    ++check_.equal;
+    return;
+  }
+  const std::filesystem::path file = compact_.evidence / fmt::format("engine_difference_{}.state", trial.first);
+  std::ofstream(file, std::ios::binary) << save_one(trial.first);
+  std::string L;
+  for (const double value : trial.straining.velocity_gradient) L += fmt::format(" {:a}", value);
+  std::ofstream(file.string() + ".txt") << fmt::format("steps {}\nvelocity_gradient{}\n", trial.straining.steps, L);
+  throw EngineDiffers(fmt::format("compact volume element {}: {}; its state and the trial are in {}; set ve.engine = "
+                                  "\"yade\" and report it",
+                                  trial.first, *difference, file.string()));
+}
+
+void CompactVolumeElements::commit() {
+  if (size() == 0) return;
+  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
+  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  std::vector<Point> ends(trials_.size());
+  in_parallel(trials_.size(), [&](std::size_t t) {
+    CompactCell& cell = *trials_[t].cell;
+    Point& end = ends[t] = points_[trials_[t].first];
+    end.cell = trials_[t].cell;
+    end.report = cell.report();
+    if (network_level(tensor(cell.stretch()), tensor(cell.stress())) != end.strained.level) cell.follow_network();
+    adopt(end);
+  });
+  for (std::size_t p = 0; p < size(); ++p) {
+    Point& end = ends[trial_of_point_[p]];
+    if (points_[p].cell.use_count() == 1) spare_.push_back(points_[p].cell);
+    points_[p].cell = end.cell;
+    points_[p].strained.stretch = end.strained.stretch;
+    points_[p].strained.level = end.strained.level;
+    points_[p].time_step = end.time_step;
+    points_[p].report = end.report;
+  }
+  trials_.clear();
+  trial_pending_ = false;
+  begin_step();
+}
+
+std::vector<PointReport> CompactVolumeElements::reports() const {
+  std::vector<PointReport> reports;
+  for (const Point& point : points_) reports.push_back(point.report);
+  return reports;
+}
+
+std::string CompactVolumeElements::save_one(std::size_t index) {
+  const Point& point = points_.at(index);
+  return encode({EngineKind::compact, point.strained.reference_time_scale, point.strained.origin, point.cell->save()});
+}
+
+SavedStates CompactVolumeElements::save() {
+  SavedStates states;
+  std::map<const CompactCell*, std::string> known;
+  for (std::size_t p = 0; p < size(); ++p) {
+    std::string& state = known[points_[p].cell.get()];
+    if (state.empty()) state = save_one(p);
+    states.push_back(state);
+  }
+  return states;
+}
+
+void CompactVolumeElements::load(const SavedStates& states) {
+  if (states.size() != size())
+    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
+  std::map<std::string_view, Point> known;  // equal states are one cell
+  std::vector<Point> loaded;
+  for (std::size_t p = 0; p < size(); ++p) {
+    auto entry = known.find(states[p]);
+    if (entry == known.end()) entry = known.emplace(states[p], point_of(states[p])).first;
+    loaded.push_back(entry->second);
+    loaded.back().strained.origin = points_[p].strained.origin;
+  }
+  points_ = std::move(loaded);
+  trial_pending_ = false;
+}
+
+void CompactVolumeElements::count_memory() {
+  std::set<const CompactCell*> cells;
+  std::uint64_t sum = 0;
+  const auto count = [&](const Cell& cell) {
+    if (cell && cells.insert(cell.get()).second) sum += cell->memory();
+  };
+  for (const Point& point : points_) count(point.cell);
+  for (const Trial& trial : trials_) count(trial.cell);
+  for (const Cell& cell : spare_) count(cell);
+  peak_memory_ = std::max(peak_memory_, sum);
+}
+
+}  // namespace femxdem

@@ -1,0 +1,35 @@
+#include "equal_histories.hpp"
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <string_view>
+#include <utility>
+
+namespace femxdem {
+
+Tensor2 quantised(const Tensor2& F) {
+  return F.unaryExpr([](double value) { return std::nearbyint(value / kQuantum) * kQuantum; });
+}
+
+EqualHistories::EqualHistories(std::span<const std::string> states) {
+  std::map<std::string_view, int> known;
+  for (const std::string& state : states)
+    committed_.push_back(known.try_emplace(state, static_cast<int>(known.size())).first->second);
+}
+
+std::size_t EqualHistories::trial(std::span<const Tensor2> F) {
+  std::map<std::pair<int, std::array<double, 9>>, int> known;
+  trial_.clear();
+  for (std::size_t p = 0; p < F.size(); ++p) {
+    std::array<double, 9> key{};
+    if (F[p].allFinite()) {
+      const Tensor2 followed = quantised(F[p]);
+      std::copy_n(followed.data(), 9, key.begin());
+    }
+    trial_.push_back(known.try_emplace({committed_[p], key}, static_cast<int>(known.size())).first->second);
+  }
+  return known.size();
+}
+
+}  // namespace femxdem

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tensor.hpp"
+
+namespace femxdem {
+
+/// Volume elements follow F up to this: points whose histories differ by round-off alone then do the same to the bit.
+inline constexpr double kQuantum = 1.0 / (1LL << 40);
+Tensor2 quantised(const Tensor2& F);
+
+/// Which points have had the same history so far: the same start, and F equal up to kQuantum ever since.
+class EqualHistories {
+ public:
+  /// Points with equal states have an equal start.
+  explicit EqualHistories(std::span<const std::string> states = {});
+  explicit EqualHistories(std::span<const int> starts) : committed_(starts.begin(), starts.end()) {}
+
+  /// A trial from the committed histories; returns how many different ones it makes.
+  std::size_t trial(std::span<const Tensor2> F);
+  /// The last trial belongs to the histories.
+  void commit() { committed_ = trial_; }
+
+ private:
+  std::vector<int> committed_, trial_;  ///< the number of each point's history
+};
+
+}  // namespace femxdem
