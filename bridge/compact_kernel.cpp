@@ -75,7 +75,7 @@ FEMXDEM_INLINE V square_root(V a) {
   }
 }
 
-// What is true is 1, what is not is 0: compilers scatter masks of 512 bits that are kept.
+// What is true is 1, what is not is 0, and "and" is a product: GCC 12 takes masks of 512 bits apart that are combined.
 template <class V>
 FEMXDEM_INLINE V greater(V a, V b) {
   return a > b ? V{} + 1.0 : V{};
@@ -344,25 +344,25 @@ FEMXDEM_INLINE void push(const CompactArrays& a, std::size_t at, const Wrenches<
 /// The classes of W contacts, number by number.
 template <int W>
 struct Classes {
-  Vec<W> adhesion, shear_adhesion, unp_max, tangent, fragile, broken;
+  Vec<W> adhesion, shear_adhesion, unp_limit, tangent, fragile, breakable;
 
   FEMXDEM_INLINE Classes(const CompactArrays& a, std::size_t at) {
     const std::uint32_t* which = a.class_of + at;
     std::uint32_t differ = 0;
-    for (int k = 1; k < W; ++k) differ |= which[k] ^ which[0];
+    repeat<W>([&](auto k) FEMXDEM_LAMBDA { differ |= which[k] ^ which[0]; });
     if (differ == 0) {
       const CompactClass& c = a.classes[which[0]];
       adhesion = splat<W>(c.normal_adhesion), shear_adhesion = splat<W>(c.shear_adhesion);
-      unp_max = splat<W>(c.unp_max), tangent = splat<W>(c.tangent);
-      fragile = splat<W>(c.fragile), broken = splat<W>(c.broken);
+      unp_limit = splat<W>(c.unp_limit), tangent = splat<W>(c.tangent);
+      fragile = splat<W>(c.fragile), breakable = splat<W>(c.breakable);
       return;
     }
-    for (int k = 0; k < W; ++k) {
+    repeat<W>([&](auto k) FEMXDEM_LAMBDA {
       const CompactClass& c = a.classes[which[k]];
       lane<W>(adhesion, k) = c.normal_adhesion, lane<W>(shear_adhesion, k) = c.shear_adhesion;
-      lane<W>(unp_max, k) = c.unp_max, lane<W>(tangent, k) = c.tangent;
-      lane<W>(fragile, k) = c.fragile, lane<W>(broken, k) = c.broken;
-    }
+      lane<W>(unp_limit, k) = c.unp_limit, lane<W>(tangent, k) = c.tangent;
+      lane<W>(fragile, k) = c.fragile, lane<W>(breakable, k) = c.breakable;
+    });
   }
 };
 
@@ -395,20 +395,18 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
     const Vec<W> kn = load<Vec<W>>(a.kn + at);
     Vec<W> unp = load<Vec<W>>(a.unp + at);
     Vec<W> normal_force = kn * (p.overlap - unp);
-    const Vec<W> torn = greater(-normal_force, c.adhesion), yields = either(c.fragile, zero, torn);
+    const Vec<W> torn = greater(-normal_force, c.adhesion), yields = torn * (1.0 - c.fragile);
     normal_force = either(yields, -c.adhesion, normal_force);
     unp = either(yields, p.overlap + c.adhesion / kn, unp);
-    const Vec<W> beyond = c.unp_max >= zero ? greater(-unp, c.unp_max) : zero;
-    const Vec<W> ends = either(c.fragile + beyond, torn, zero);
+    const Vec<W> ends = torn * (c.fragile + greater(-unp, c.unp_limit));
     const Vec<W> friction = normal_force * c.tangent;
     Vec<W> limit = c.shear_adhesion + friction;
     limit = limit > zero ? limit : zero;
     const Vec<W> size = square_root(dot(p.shear, p.shear)), slides = greater(size, limit);
-    const Vec<W> breaks = either(c.fragile - c.broken, slides, zero);
+    const Vec<W> breaks = slides * c.breakable;
     limit = either(breaks, friction > zero ? friction : zero, limit);
     const Vec3<W> shear = scaled<W>(either(slides, limit / size, splat<W>(1.0)), p.shear);
-    const Vec<W> pulls = greater(zero, normal_force);
-    normal_force = either(slides * pulls, zero, normal_force);
+    normal_force = either(slides * greater(zero, normal_force), zero, normal_force);
     Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
     f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
     const Vec3<W> xi = p.i.x(), point = xi + scaled<W>(p.i.radius() - 0.5 * p.overlap, p.normal);
