@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -24,20 +23,14 @@ namespace {
 /// f(0), f(1), ..., f(N - 1) with constants: arrays of vectors then live in registers.
 template <int N, class F>
 FEMXDEM_INLINE void repeat(F f) {
-  [&]<int... K>(std::integer_sequence<int, K...>) FEMXDEM_LAMBDA {
-    (f(std::integral_constant<int, K>{}), ...);
-  }(std::make_integer_sequence<int, N>{});
+  [&]<int... K>(std::integer_sequence<int, K...>) FEMXDEM_LAMBDA { (f(std::integral_constant<int, K>{}), ...); }
+  (std::make_integer_sequence<int, N>{});
 }
 
 template <int W>
 struct Lanes {
   using V [[gnu::vector_size(8 * W)]] = double;
   using I [[gnu::vector_size(4 * W)]] = std::int32_t;
-};
-template <>
-struct Lanes<1> {
-  using V = double;
-  using I = std::int32_t;
 };
 template <int W>
 using Vec = typename Lanes<W>::V;
@@ -66,13 +59,9 @@ FEMXDEM_INLINE double& lane(Vec<W>& v, int k) {
 
 template <class V>
 FEMXDEM_INLINE V square_root(V a) {
-  if constexpr (std::is_same_v<V, double>) {
-    return __builtin_sqrt(a);
-  } else {
-    V r = a;
-    repeat<sizeof(V) / sizeof(double)>([&](auto k) FEMXDEM_LAMBDA { r[int{k}] = __builtin_sqrt(a[int{k}]); });
-    return r;
-  }
+  V r = a;
+  repeat<sizeof(V) / sizeof(double)>([&](auto k) FEMXDEM_LAMBDA { r[int{k}] = __builtin_sqrt(a[int{k}]); });
+  return r;
 }
 
 // What is true is 1, what is not is 0, and "and" is a product: GCC 12 takes masks of 512 bits apart that are combined.
@@ -88,28 +77,25 @@ FEMXDEM_INLINE V either(V which, V a, V b) {
 /// Whether something is true in some lane.
 template <int W>
 FEMXDEM_INLINE bool any(Vec<W> a) {
-  if constexpr (W == 1) {
-    return a > 0;
-  } else {
-    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
-    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5);
-    if constexpr (W == 4) a += __builtin_shufflevector(a, a, 2, 3, 0, 1);
-    return a[0] + a[1] > 0;
-  }
+  if constexpr (W == 8) a += __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
+  if constexpr (W == 8) a += __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5);
+  if constexpr (W == 4) a += __builtin_shufflevector(a, a, 2, 3, 0, 1);
+  return a[0] + a[1] > 0;
 }
 
 template <int W>
 FEMXDEM_INLINE Vec<W> to_double(typename Lanes<W>::I a) {
-  if constexpr (W == 1)
-    return static_cast<double>(a);
-  else
-    return __builtin_convertvector(a, Vec<W>);
+  return __builtin_convertvector(a, Vec<W>);
 }
 
 /// rows[r][c] -> rows[c][r].
 template <int W>
 FEMXDEM_INLINE void transpose(Vec<W>* rows) {
-  if constexpr (W == 4) {
+  if constexpr (W == 2) {
+    const Vec<2> a = rows[0], b = rows[1];
+    rows[0] = __builtin_shufflevector(a, b, 0, 2);
+    rows[1] = __builtin_shufflevector(a, b, 1, 3);
+  } else if constexpr (W == 4) {
     const Vec<4> a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
     const Vec<4> b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
     const Vec<4> c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
@@ -406,7 +392,7 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
     const Vec<W> breaks = slides * c.breakable;
     limit = either(breaks, friction > zero ? friction : zero, limit);
     const Vec3<W> shear = scaled<W>(either(slides, limit / size, splat<W>(1.0)), p.shear);
-    normal_force = either(slides * greater(zero, normal_force), zero, normal_force);
+    normal_force = either(-(slides * normal_force), zero, normal_force);
     Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
     f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
     const Vec3<W> xi = p.i.x(), point = xi + scaled<W>(p.i.radius() - 0.5 * p.overlap, p.normal);
@@ -463,7 +449,7 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
   constexpr CompactLoops NAME##_loops = {NAME##_integrate, NAME##_cohesive, NAME##_friction};
 // clang-format on
 
-FEMXDEM_LOOPS(scalar, , 1)
+FEMXDEM_LOOPS(baseline, , 2)
 #ifdef __x86_64__
 FEMXDEM_LOOPS(v3, [[gnu::target("arch=x86-64-v3")]], 4)
 FEMXDEM_LOOPS(v4, [[gnu::target("arch=x86-64-v4")]], 8)
@@ -474,11 +460,11 @@ Kernel kernel_at_start() {
   const char* wish = std::getenv("FEMXDEM_KERNEL");
   const std::vector<Kernel> there = kernels();
   if (!wish || !*wish) return there.back();
-  const std::array<std::string, 3> names = {"scalar", "x86-64-v3", "x86-64-v4"};
+  const std::array<std::string, 3> names = {"baseline", "x86-64-v3", "x86-64-v4"};
   const auto k = static_cast<std::size_t>(std::find(names.begin(), names.end(), wish) - names.begin());
   if (k < there.size()) return there[k];
   throw UserError(std::string("FEMXDEM_KERNEL = \"") + wish +
-                  "\": this processor has no such kernel; use scalar, x86-64-v3 or x86-64-v4");
+                  "\": this processor has no such kernel; use baseline, x86-64-v3 or x86-64-v4");
 }
 
 Kernel& current_kernel() {
@@ -489,7 +475,7 @@ Kernel& current_kernel() {
 }  // namespace
 
 std::vector<Kernel> kernels() {
-  std::vector<Kernel> there = {Kernel::scalar};
+  std::vector<Kernel> there = {Kernel::baseline};
 #ifdef __x86_64__
   if (__builtin_cpu_supports("x86-64-v3")) there.push_back(Kernel::x86_64_v3);
   if (__builtin_cpu_supports("x86-64-v4")) there.push_back(Kernel::x86_64_v4);
@@ -511,7 +497,7 @@ const CompactLoops& compact_loops() {
   if (current_kernel() == Kernel::x86_64_v4) return v4_loops;
   if (current_kernel() == Kernel::x86_64_v3) return v3_loops;
 #endif
-  return scalar_loops;
+  return baseline_loops;
 }
 
 }  // namespace femxdem
