@@ -41,6 +41,8 @@ struct CompactClass {
   double when_broken = 0;      ///< class of a contact that has slid, as a number
   double when_aged = -1;       ///< class of a new contact that becomes adhesive, -1: it does not
   double for_new = 0;          ///< 1: of contacts that form later
+  double unp_limit = 0;        ///< unp_max, or infinity [m]
+  double breakable = 0;        ///< 1: fragile and not broken
 };
 
 /// A pair that may touch: image j + shift of sphere j near sphere i.

@@ -24,12 +24,12 @@ struct CompactTrial {
 };
 
 /// Which compilation of the step runs: all give equal bits, the fastest that the processor has is the default.
-enum class Kernel { scalar, x86_64_v3, x86_64_v4 };
+enum class Kernel { baseline, x86_64_v3, x86_64_v4 };
 
 /// The kernels that this processor has, slowest first.
 std::vector<Kernel> kernels();
 /// From now on every cell of this process steps with `kernel`; for tests. Throws UserError where the processor has it
-/// not. The environment's FEMXDEM_KERNEL = scalar | x86-64-v3 | x86-64-v4 is the same at the start.
+/// not. The environment's FEMXDEM_KERNEL = baseline | x86-64-v3 | x86-64-v4 is the same at the start.
 void use_kernel(Kernel kernel);
 Kernel kernel_in_use();
 

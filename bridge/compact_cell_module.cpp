@@ -56,7 +56,7 @@ py::array_t<double> deform(CompactCell& cell, const py::array_t<double, py::arra
 PYBIND11_MODULE(compact_cell, module) {
   py::register_exception<femxdem::UserError>(module, "UserError", PyExc_ValueError);
   py::enum_<femxdem::Kernel>(module, "Kernel")
-      .value("scalar", femxdem::Kernel::scalar)
+      .value("baseline", femxdem::Kernel::baseline)
       .value("x86_64_v3", femxdem::Kernel::x86_64_v3)
       .value("x86_64_v4", femxdem::Kernel::x86_64_v4);
   module.def("kernels", &femxdem::kernels, "The kernels that this processor has, slowest first.");

@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -24,20 +23,14 @@ namespace {
 /// f(0), f(1), ..., f(N - 1) with constants: arrays of vectors then live in registers.
 template <int N, class F>
 FEMXDEM_INLINE void repeat(F f) {
-  [&]<int... K>(std::integer_sequence<int, K...>) FEMXDEM_LAMBDA {
-    (f(std::integral_constant<int, K>{}), ...);
-  }(std::make_integer_sequence<int, N>{});
+  [&]<int... K>(std::integer_sequence<int, K...>) FEMXDEM_LAMBDA { (f(std::integral_constant<int, K>{}), ...); }
+  (std::make_integer_sequence<int, N>{});
 }
 
 template <int W>
 struct Lanes {
   using V [[gnu::vector_size(8 * W)]] = double;
   using I [[gnu::vector_size(4 * W)]] = std::int32_t;
-};
-template <>
-struct Lanes<1> {
-  using V = double;
-  using I = std::int32_t;
 };
 template <int W>
 using Vec = typename Lanes<W>::V;
@@ -66,16 +59,12 @@ FEMXDEM_INLINE double& lane(Vec<W>& v, int k) {
 
 template <class V>
 FEMXDEM_INLINE V square_root(V a) {
-  if constexpr (std::is_same_v<V, double>) {
-    return __builtin_sqrt(a);
-  } else {
-    V r = a;
-    repeat<sizeof(V) / sizeof(double)>([&](auto k) FEMXDEM_LAMBDA { r[int{k}] = __builtin_sqrt(a[int{k}]); });
-    return r;
-  }
+  V r = a;
+  repeat<sizeof(V) / sizeof(double)>([&](auto k) FEMXDEM_LAMBDA { r[int{k}] = __builtin_sqrt(a[int{k}]); });
+  return r;
 }
 
-// What is true is 1, what is not is 0: compilers scatter masks of 512 bits that are kept.
+// What is true is 1, what is not is 0, and "and" is a product: GCC 12 takes masks of 512 bits apart that are combined.
 template <class V>
 FEMXDEM_INLINE V greater(V a, V b) {
   return a > b ? V{} + 1.0 : V{};
@@ -88,28 +77,25 @@ FEMXDEM_INLINE V either(V which, V a, V b) {
 /// Whether something is true in some lane.
 template <int W>
 FEMXDEM_INLINE bool any(Vec<W> a) {
-  if constexpr (W == 1) {
-    return a > 0;
-  } else {
-    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
-    if constexpr (W == 8) a += __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5);
-    if constexpr (W == 4) a += __builtin_shufflevector(a, a, 2, 3, 0, 1);
-    return a[0] + a[1] > 0;
-  }
+  if constexpr (W == 8) a += __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
+  if constexpr (W == 8) a += __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5);
+  if constexpr (W == 4) a += __builtin_shufflevector(a, a, 2, 3, 0, 1);
+  return a[0] + a[1] > 0;
 }
 
 template <int W>
 FEMXDEM_INLINE Vec<W> to_double(typename Lanes<W>::I a) {
-  if constexpr (W == 1)
-    return static_cast<double>(a);
-  else
-    return __builtin_convertvector(a, Vec<W>);
+  return __builtin_convertvector(a, Vec<W>);
 }
 
 /// rows[r][c] -> rows[c][r].
 template <int W>
 FEMXDEM_INLINE void transpose(Vec<W>* rows) {
-  if constexpr (W == 4) {
+  if constexpr (W == 2) {
+    const Vec<2> a = rows[0], b = rows[1];
+    rows[0] = __builtin_shufflevector(a, b, 0, 2);
+    rows[1] = __builtin_shufflevector(a, b, 1, 3);
+  } else if constexpr (W == 4) {
     const Vec<4> a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
     const Vec<4> b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
     const Vec<4> c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
@@ -344,25 +330,25 @@ FEMXDEM_INLINE void push(const CompactArrays& a, std::size_t at, const Wrenches<
 /// The classes of W contacts, number by number.
 template <int W>
 struct Classes {
-  Vec<W> adhesion, shear_adhesion, unp_max, tangent, fragile, broken;
+  Vec<W> adhesion, shear_adhesion, unp_limit, tangent, fragile, breakable;
 
   FEMXDEM_INLINE Classes(const CompactArrays& a, std::size_t at) {
     const std::uint32_t* which = a.class_of + at;
     std::uint32_t differ = 0;
-    for (int k = 1; k < W; ++k) differ |= which[k] ^ which[0];
+    repeat<W>([&](auto k) FEMXDEM_LAMBDA { differ |= which[k] ^ which[0]; });
     if (differ == 0) {
       const CompactClass& c = a.classes[which[0]];
       adhesion = splat<W>(c.normal_adhesion), shear_adhesion = splat<W>(c.shear_adhesion);
-      unp_max = splat<W>(c.unp_max), tangent = splat<W>(c.tangent);
-      fragile = splat<W>(c.fragile), broken = splat<W>(c.broken);
+      unp_limit = splat<W>(c.unp_limit), tangent = splat<W>(c.tangent);
+      fragile = splat<W>(c.fragile), breakable = splat<W>(c.breakable);
       return;
     }
-    for (int k = 0; k < W; ++k) {
+    repeat<W>([&](auto k) FEMXDEM_LAMBDA {
       const CompactClass& c = a.classes[which[k]];
       lane<W>(adhesion, k) = c.normal_adhesion, lane<W>(shear_adhesion, k) = c.shear_adhesion;
-      lane<W>(unp_max, k) = c.unp_max, lane<W>(tangent, k) = c.tangent;
-      lane<W>(fragile, k) = c.fragile, lane<W>(broken, k) = c.broken;
-    }
+      lane<W>(unp_limit, k) = c.unp_limit, lane<W>(tangent, k) = c.tangent;
+      lane<W>(fragile, k) = c.fragile, lane<W>(breakable, k) = c.breakable;
+    });
   }
 };
 
@@ -395,20 +381,18 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
     const Vec<W> kn = load<Vec<W>>(a.kn + at);
     Vec<W> unp = load<Vec<W>>(a.unp + at);
     Vec<W> normal_force = kn * (p.overlap - unp);
-    const Vec<W> torn = greater(-normal_force, c.adhesion), yields = either(c.fragile, zero, torn);
+    const Vec<W> torn = greater(-normal_force, c.adhesion), yields = torn * (1.0 - c.fragile);
     normal_force = either(yields, -c.adhesion, normal_force);
     unp = either(yields, p.overlap + c.adhesion / kn, unp);
-    const Vec<W> beyond = c.unp_max >= zero ? greater(-unp, c.unp_max) : zero;
-    const Vec<W> ends = either(c.fragile + beyond, torn, zero);
+    const Vec<W> ends = torn * (c.fragile + greater(-unp, c.unp_limit));
     const Vec<W> friction = normal_force * c.tangent;
     Vec<W> limit = c.shear_adhesion + friction;
     limit = limit > zero ? limit : zero;
     const Vec<W> size = square_root(dot(p.shear, p.shear)), slides = greater(size, limit);
-    const Vec<W> breaks = either(c.fragile - c.broken, slides, zero);
+    const Vec<W> breaks = slides * c.breakable;
     limit = either(breaks, friction > zero ? friction : zero, limit);
     const Vec3<W> shear = scaled<W>(either(slides, limit / size, splat<W>(1.0)), p.shear);
-    const Vec<W> pulls = greater(zero, normal_force);
-    normal_force = either(slides * pulls, zero, normal_force);
+    normal_force = either(-(slides * normal_force), zero, normal_force);
     Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
     f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
     const Vec3<W> xi = p.i.x(), point = xi + scaled<W>(p.i.radius() - 0.5 * p.overlap, p.normal);
@@ -465,7 +449,7 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
   constexpr CompactLoops NAME##_loops = {NAME##_integrate, NAME##_cohesive, NAME##_friction};
 // clang-format on
 
-FEMXDEM_LOOPS(scalar, , 1)
+FEMXDEM_LOOPS(baseline, , 2)
 #ifdef __x86_64__
 FEMXDEM_LOOPS(v3, [[gnu::target("arch=x86-64-v3")]], 4)
 FEMXDEM_LOOPS(v4, [[gnu::target("arch=x86-64-v4")]], 8)
@@ -476,11 +460,11 @@ Kernel kernel_at_start() {
   const char* wish = std::getenv("FEMXDEM_KERNEL");
   const std::vector<Kernel> there = kernels();
   if (!wish || !*wish) return there.back();
-  const std::array<std::string, 3> names = {"scalar", "x86-64-v3", "x86-64-v4"};
+  const std::array<std::string, 3> names = {"baseline", "x86-64-v3", "x86-64-v4"};
   const auto k = static_cast<std::size_t>(std::find(names.begin(), names.end(), wish) - names.begin());
   if (k < there.size()) return there[k];
   throw UserError(std::string("FEMXDEM_KERNEL = \"") + wish +
-                  "\": this processor has no such kernel; use scalar, x86-64-v3 or x86-64-v4");
+                  "\": this processor has no such kernel; use baseline, x86-64-v3 or x86-64-v4");
 }
 
 Kernel& current_kernel() {
@@ -491,7 +475,7 @@ Kernel& current_kernel() {
 }  // namespace
 
 std::vector<Kernel> kernels() {
-  std::vector<Kernel> there = {Kernel::scalar};
+  std::vector<Kernel> there = {Kernel::baseline};
 #ifdef __x86_64__
   if (__builtin_cpu_supports("x86-64-v3")) there.push_back(Kernel::x86_64_v3);
   if (__builtin_cpu_supports("x86-64-v4")) there.push_back(Kernel::x86_64_v4);
@@ -513,7 +497,7 @@ const CompactLoops& compact_loops() {
   if (current_kernel() == Kernel::x86_64_v4) return v4_loops;
   if (current_kernel() == Kernel::x86_64_v3) return v3_loops;
 #endif
-  return scalar_loops;
+  return baseline_loops;
 }
 
 }  // namespace femxdem

@@ -111,8 +111,10 @@ void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
 /// The classes that the contacts and their future need, each once.
 class ClassTable {
  public:
-  /// new_adhesion NaN: contacts that form later have none.
-  ClassTable(double new_adhesion, double new_friction) : adhesion_(new_adhesion), friction_(new_friction) {}
+  explicit ClassTable(const CompactHeader& header)
+      : cohesive_(header.law == CompactLaw::cohesive ? 1.0 : 0.0),
+        adhesion_(header.new_adhesion),
+        friction_(header.new_friction) {}
 
   std::uint32_t add(const CompactClass& c) {
     const Key key = {c.normal_adhesion, c.shear_adhesion, c.unp_max, c.tangent, c.fragile, c.broken, c.for_new};
@@ -121,14 +123,17 @@ class ClassTable {
     if (!added) return at;
     classes_.push_back(c);
     const bool breakable = c.fragile != 0 && c.broken == 0;
-    classes_[at].when_broken = breakable ? add({0, 0, c.unp_max, c.tangent, c.fragile, 1}) : at;
+    classes_[at].breakable = breakable;
+    classes_[at].unp_limit = c.unp_max >= 0 ? c.unp_max : std::numeric_limits<double>::infinity();
+    const std::uint32_t broken = breakable ? add({0, 0, c.unp_max, c.tangent, c.fragile, 1, 0, -1, 0, 0, 0}) : at;
+    classes_[at].when_broken = broken;
     return at;
   }
   /// Contacts that have just formed; if they become adhesive, they wait for it.
   std::uint32_t add_new(double tangent) {
-    const std::uint32_t at = add({.tangent = tangent, .fragile = 1, .broken = 1, .for_new = 1});
+    const std::uint32_t at = add({0, 0, 0, tangent, cohesive_, cohesive_, 0, -1, 1, 0, 0});
     if (!std::isnan(adhesion_) && classes_[at].when_aged < 0) {
-      const std::uint32_t aged = add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0});
+      const std::uint32_t aged = add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0, 0, -1, 0, 0, 0});
       classes_[at].when_aged = aged;
     }
     return at;
@@ -137,7 +142,7 @@ class ClassTable {
 
  private:
   using Key = std::array<double, 7>;
-  double adhesion_, friction_;
+  double cohesive_, adhesion_, friction_;
   std::map<Key, std::uint32_t> places_;
   std::vector<CompactClass> classes_;
 };
@@ -208,7 +213,7 @@ CompactBlock block_of_scene(std::string_view exported) {
   contact_numbers(reader, contacts);
   check_contacts(contacts, head.spheres);
   std::sort(contacts.begin(), contacts.end(), [](const auto& p, const auto& q) { return p.ids < q.ids; });
-  ClassTable table(head.header.new_adhesion, head.header.new_friction);
+  ClassTable table(head.header);
   const CompactArrays& s = spheres.arrays();
   for (std::size_t k = 0; k < head.header.spheres; ++k) table.add_new(s.tangent[k]);
   std::vector<std::uint32_t> class_of;

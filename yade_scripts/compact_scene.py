@@ -141,7 +141,8 @@ def export(O):
 
 def _numbers(O, law, safety):
     newton, cell, physics = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0]
-    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf, cell.velGrad, newton.prevVelGrad)]
+    L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator
+    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf, L, newton.prevVelGrad)]
     new = contact_laws.adhesion_of_new_contacts(O) or (math.nan, math.nan)
     constants = [getattr(physics, name, None) if law == FRICTION else None for name in ("kn", "ks")]
     constants = [math.nan if maker is None else maker.val for maker in constants]
@@ -208,3 +209,141 @@ def _scalars(objects, name):
 
 def _vectors(objects, name):
     return np.array([tuple(v) for v in map(attrgetter(name), objects)]).reshape(len(objects), 3)
+
+
+class Scene:
+    """An export as arrays, spheres by id and contacts by ids; names as in bridge/compact_scene.hpp."""
+
+    SPHERES = {"x": 3, "v": 3, "w": 3, "f": 3, "t": 3, "turned": 4}
+    SPHERES |= dict.fromkeys("radius mass inertia young poisson tangent".split(), 1)
+    CONTACTS = dict.fromkeys("kn ks normal_adhesion shear_adhesion unp unp_max tangent fragile broken normal_force".split(), 1)
+    CONTACTS |= {"shear": 3, "normal": 3}
+
+    def __init__(self, exported):
+        if exported[: len(MAGIC)] != MAGIC:
+            raise ValueError("this is not the export of a YADE scene")
+        self._words, self._at = np.frombuffer(exported, np.int64, offset=len(MAGIC)), 0
+        self.version, self.law, n, m, self.iteration, starts = (int(k) for k in self._take(6))
+        self.time_step, self.damping = self._floats(2)
+        self.H, self.trsf, self.L, self.previous_L = self._floats(36).reshape(4, 3, 3)
+        self.constants = self._floats(8)
+        for name, width in self.SPHERES.items():
+            setattr(self, name, self._rows(n, width))
+        self.ids, self.shift = self._take(2 * m).reshape(m, 2), self._take(3 * m).reshape(m, 3)
+        self.waits = self._take(m)
+        for name, width in self.CONTACTS.items():
+            setattr(self, name, self._rows(m, width))
+        self.start = self._floats(6 * n * starts)
+
+    def _take(self, count):
+        self._at += count
+        return self._words[self._at - count : self._at]
+
+    def _floats(self, count):
+        return self._take(count).view(float)
+
+    def _rows(self, count, width):
+        numbers = self._floats(count * width)
+        return numbers if width == 1 else numbers.reshape(count, width)
+
+
+def write_back(O, exported):
+    """Puts a state of the compact engine into the scene of `O`, which rests and was made from the same template.
+
+    YADE makes the contacts itself: first between spheres large enough for those that are in tension, then, with their
+    laws, between the true ones; no time passes. Steps without time bring the scene's count to the same place between two
+    looks for new contacts. Raises RuntimeError when YADE's contacts are others.
+    """
+    from yade.utils import Quaternion
+
+    scene = Scene(exported)
+    if len(O.bodies) != len(scene.radius):
+        raise RuntimeError(f"A state of {len(scene.radius)} spheres does not fit a YADE scene of {len(O.bodies)}.")
+    newton, O.dt = O.engines[-1], 0.0
+    _set_cell(O, scene, np.zeros((3, 3)))
+    while O.iter % contact_laws.EVERY != (scene.iteration - 2) % contact_laws.EVERY:
+        _again(O)
+    _place(O, scene, _enlargement(scene))
+    O.interactions.clear()
+    _again(O)
+    contacts = _matched(O, scene)
+    for name in ("laws", "forces"):
+        _set_contacts(contacts, scene, name, O.iter)
+    _place(O, scene, 1.0)
+    _again(O)
+    _set_contacts(_matched(O, scene), scene, "forces", O.iter)
+    O.forces.f(0, True)  # YADE forgets nothing in a reset that it has not summed before
+    O.forces.reset(False)
+    for b, v, w, f, t, turned in zip(O.bodies, scene.v, scene.w, scene.f, scene.t, scene.turned):
+        b.state.vel, b.state.angVel = v, w
+        b.state.ori = Quaternion(*turned) * b.state.refOri
+        O.forces.addF(b.id, tuple(f))
+        O.forces.addT(b.id, tuple(t))
+    _set_cell(O, scene, scene.previous_L)
+    O.cell.velGrad = _matrix(scene.L)
+    newton.damping, O.dt = scene.damping, scene.time_step
+
+
+def _set_cell(O, scene, L):
+    O.cell.hSize, O.cell.trsf = _matrix(scene.H), _matrix(scene.trsf)
+    O.cell.velGrad = O.engines[-1].prevVelGrad = _matrix(L)
+
+
+def _matrix(T):
+    from yade.utils import Matrix3
+
+    return Matrix3(*map(float, np.ravel(T)))
+
+
+def _again(O):
+    """From rest to rest without time: positions stay, contacts are found anew."""
+    O.step()
+    O.subStepping = True
+    for _ in O.engines:
+        O.step()
+    O.subStepping = False
+
+
+def _enlargement(scene):
+    """Of the radii, so that all contacts overlap."""
+    i, j = scene.ids.T
+    d = scene.x[j] + scene.shift @ scene.H.T - scene.x[i]
+    return max(1.0, (np.linalg.norm(d, axis=1) / (scene.radius[i] + scene.radius[j])).max(initial=1.0)) * (1 + 1e-6)
+
+
+def _place(O, scene, factor):
+    for b, x, r in zip(O.bodies, scene.x, scene.radius):
+        b.state.pos, b.shape.radius = x, float(r) * factor
+        b.state.vel = b.state.angVel = (0, 0, 0)
+
+
+def _matched(O, scene):
+    """YADE's contacts in the order of the scene's; those that are too many become potential ones."""
+    wanted = {tuple(pair): at for at, pair in enumerate(scene.ids.tolist())}
+    found = [None] * len(wanted)
+    for i in list(O.interactions):
+        at = wanted.get((i.id1, i.id2))
+        if at is None:
+            O.interactions.erase(i.id1, i.id2)
+        else:
+            found[at] = i
+    for i, pair, shift in zip(found, scene.ids, scene.shift.tolist()):
+        if i is None or list(i.cellDist) != shift:
+            raise RuntimeError(f"YADE does not find the contact of the bodies {pair[0]} and {pair[1]} of a compact state.")
+    return found
+
+
+def _set_contacts(contacts, scene, what, now):
+    cohesive = scene.law == COHESIVE
+    for at, i in enumerate(contacts):
+        p = i.phys
+        if what == "forces":
+            i.geom.normal = tuple(scene.normal[at])
+            p.normalForce, p.shearForce = tuple(scene.normal_force[at] * scene.normal[at]), tuple(scene.shear[at])
+            continue
+        i.iterMadeReal = now if scene.waits[at] else 0
+        p.kn, p.ks, p.tangensOfFrictionAngle = (float(a[at]) for a in (scene.kn, scene.ks, scene.tangent))
+        if cohesive:
+            p.normalAdhesion, p.shearAdhesion = float(scene.normal_adhesion[at]), float(scene.shear_adhesion[at])
+            p.unp, p.unpMax = float(scene.unp[at]), float(scene.unp_max[at])
+            p.fragile, p.cohesionBroken = bool(scene.fragile[at]), bool(scene.broken[at])
