@@ -17,6 +17,7 @@
 /// What the bridge costs beside the DEM engine, on volume elements as they are used:
 ///
 ///     bridge_benchmark snapshot --spheres 1000                  fork against serialise, trials of one DEM step
+///     bridge_benchmark trial --inertial-number 0.02 --steps 10  trials as a solver asks for them
 ///     mpirun -np 2 bridge_benchmark overhead --spheres 1000     engine seconds over ranks x wall time of evaluate
 namespace femxdem {
 namespace {
@@ -26,12 +27,15 @@ struct Settings {
   std::size_t points = 20;
   int steps = 100;
   int repetitions = 3;
+  double inertial_number = 5e-3;
+  double cohesion = 1;
   std::string cache = "packings";
 };
 
 std::string packing(PythonVolumeElements& elements, const Settings& settings) {
   VeParameters ve;
   ve.spheres = settings.spheres;
+  ve.cohesion = settings.cohesion;
   ve.cache = settings.cache;
   return make_templates(elements, {ve}, [](std::string_view line) { fmt::print("{}\n", line); }).front();
 }
@@ -39,6 +43,7 @@ std::string packing(PythonVolumeElements& elements, const Settings& settings) {
 VolumeElementOptions options(const Settings& settings, bool serialise = false) {
   VolumeElementOptions options;
   options.min_steps = settings.steps;
+  options.inertial_number = settings.inertial_number;
   options.serialise = serialise;
   options.max_unbalanced_force = 1e9;
   return options;
@@ -49,6 +54,17 @@ std::vector<Tensor2> gradients(std::size_t points, int trial) {
   Tensor2 F = Tensor2::Identity();
   F(1, 1) -= 1e-6 * (1 + trial);
   return std::vector<Tensor2>(points, F);
+}
+
+/// Biaxial gradients reached in `steps` steps at the inertial number, from F = I; the path goes forth and back.
+std::vector<Tensor2> biaxial(PythonVolumeElements& elements, const Settings& settings, int trial) {
+  const VeInfo info = elements.info(0);
+  const double way = 0.999 * settings.steps * info.time_step * settings.inertial_number / info.time_scale;
+  const double from_start = way * (trial % 4 == 1 ? 2 : trial % 2 == 0 ? 1 : 0) / std::sqrt(1.25);
+  Tensor2 F = Tensor2::Identity();
+  F(0, 0) = std::exp(0.5 * from_start);
+  F(1, 1) = std::exp(-from_start);
+  return std::vector<Tensor2>(elements.size(), F);
 }
 
 struct ProcessorTime {
@@ -83,10 +99,11 @@ void settle(PythonVolumeElements& elements) {
 }
 
 /// Processor time of one trial per volume element, snapshot included, and of its commit [ms].
-ProcessorTime cost(WorkerProcess& worker, PythonVolumeElements& elements, int trial, bool commit) {
+ProcessorTime cost(WorkerProcess& worker, PythonVolumeElements& elements, const std::vector<Tensor2>& F, bool commit) {
   elements.begin_step();
   const ProcessorTime before = processor_time(worker);
-  elements.evaluate(gradients(elements.size(), trial), Operator::none);
+  for (const Response& response : elements.evaluate(F, Operator::none))
+    if (response.failure) throw std::runtime_error(response.failure->sentence);
   if (commit) elements.commit();
   settle(elements);
   const ProcessorTime after = processor_time(worker);
@@ -116,15 +133,35 @@ void print_snapshot_costs(WorkerProcess& worker, const Settings& settings) {
   for (const bool commit : {false, true}) {
     std::vector<double> forking, kernel, saving;
     for (int trial = 0; trial < settings.repetitions; ++trial) {
-      const ProcessorTime fork = cost(worker, forked, trial, commit);
+      const std::vector<Tensor2> F = gradients(settings.points, trial);
+      const ProcessorTime fork = cost(worker, forked, F, commit);
       forking.push_back(fork.all);
       kernel.push_back(fork.kernel);
-      saving.push_back(cost(other, saved, trial, commit).all);
+      saving.push_back(cost(other, saved, F, commit).all);
     }
     fmt::print("{:<10} by forking {:.2f}, {:.2f} of it in the kernel; by serialising {:.2f}: ratio {:.1f}\n",
                commit ? "committed" : "rejected", median(forking), median(kernel), median(saving),
                median(saving) / median(forking));
   }
+}
+
+/// Each trial is made twice: rejected, and again to be committed.
+void print_trial_costs(WorkerProcess& worker, const Settings& settings) {
+  PythonVolumeElements elements(worker, options(settings));
+  elements.add(packing(elements, settings), settings.points);
+  std::vector<double> rejected, committed, kernel;
+  for (int trial = 0; trial < settings.repetitions; ++trial) {
+    const std::vector<Tensor2> F = biaxial(elements, settings, trial);
+    const ProcessorTime all = cost(worker, elements, F, false);
+    rejected.push_back(all.all);
+    kernel.push_back(all.kernel);
+    committed.push_back(cost(worker, elements, F, true).all);
+  }
+  fmt::print(
+      "{} volume elements of {} spheres, I = {:g}, {} DEM steps: processor time [ms] of a volume element and trial, "
+      "medians of {}: {:.2f}, {:.2f} of it in the kernel; with its commit {:.2f}\n",
+      settings.points, settings.spheres, settings.inertial_number, settings.steps, settings.repetitions,
+      median(rejected), median(kernel), median(committed));
 }
 
 void print_overhead(PythonVolumeElements& local, const Settings& settings) {
@@ -144,7 +181,7 @@ void print_overhead(PythonVolumeElements& local, const Settings& settings) {
   fmt::print("engine / (ranks x wall) = {:.3f}, trials / (ranks x wall) = {:.3f}; {:.0f} bytes a point and trial\n",
              s.engine_seconds / (ranks * s.seconds), s.trial_seconds / (ranks * s.seconds),
              static_cast<double>(s.bytes) / static_cast<double>(s.evaluations));
-  fmt::print("workers' memory {:.0f} MB\n", static_cast<double>(points.peak_memory()) / 1e6);
+  fmt::print("workers' memory {:.0f} MB\n", static_cast<double>(points.account().peak_memory) / 1e6);
 }
 
 void measure_overhead(WorkerProcess& worker, const Settings& settings) {
@@ -167,20 +204,25 @@ int main(int argc, char** argv) {
   CLI::App app{"Costs of the bridge between the ranks and YADE"};
   Settings settings;
   CLI::App* snapshot = app.add_subcommand("snapshot", "fork against serialise");
+  CLI::App* trial = app.add_subcommand("trial", "trials as a solver asks for them");
   CLI::App* overhead = app.add_subcommand("overhead", "engine seconds over ranks x wall time of evaluate");
   app.require_subcommand(1);
-  for (CLI::App* command : {snapshot, overhead}) {
+  for (CLI::App* command : {snapshot, trial, overhead}) {
     command->add_option("--spheres", settings.spheres, "of a volume element");
     command->add_option("--points", settings.points, "volume elements in all");
     command->add_option("--steps", settings.steps, "of a trial");
     command->add_option("--repetitions", settings.repetitions, "trials");
     command->add_option("--cache", settings.cache, "folder of prepared packings");
   }
+  trial->add_option("--inertial-number", settings.inertial_number, "of the trials");
+  trial->add_option("--cohesion", settings.cohesion, "p* of the packing");
   snapshot->preparse_callback([&](std::size_t) { settings.steps = 1; });  // what is left beside the engine
   CLI11_PARSE(app, argc, argv);
   WorkerProcess worker({});
   if (snapshot->parsed())
     print_snapshot_costs(worker, settings);
+  else if (trial->parsed())
+    print_trial_costs(worker, settings);
   else
     measure_overhead(worker, settings);
 }

@@ -40,12 +40,15 @@ void PythonVolumeElements::add(const std::string& state, std::size_t count) {
   if (count == 0) return;
   drop_trial();
   const std::optional<VeState> saved = decode(state);
+  if (saved && saved->engine == EngineKind::compact)
+    throw UserError("a compact cell's state goes back only into a volume element of the scene that it was made from");
   worker_.request(Command::add, static_cast<std::int64_t>(count), 0, saved ? saved->bytes : state);
   const std::size_t first = size();
   const VeInfo added = worker_.slot(first).info;
   if (!saved) require_time_scale(added.time_scale, added.time_step, added.mean_stress);
   StrainedPoint point;
   point.reference_time_scale = saved ? saved->reference_time_scale : added.time_scale;
+  point.origin = saved ? saved->origin : hash(state);
   points_.resize(first + count, point);
   for (std::size_t i = first; i < size(); ++i) adopt_state(i);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
@@ -157,7 +160,7 @@ void PythonVolumeElements::commit() {
 std::string PythonVolumeElements::save_one(std::size_t index) {
   std::string bytes = worker_.mail(worker_.request(Command::save, static_cast<std::int64_t>(index)));
   adopt_state(index);
-  return encode({EngineKind::yade, points_[index].reference_time_scale, std::move(bytes)});
+  return encode({EngineKind::yade, points_[index].reference_time_scale, points_[index].origin, std::move(bytes)});
 }
 
 std::vector<PointReport> PythonVolumeElements::reports() const {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <numbers>
@@ -93,6 +94,22 @@ inline void check_continuation(MaterialPoints& points, const Tolerances& toleran
     EXPECT_LE((at_once[i].stress - in_two[i].stress).norm(), tolerances.path * at_once[i].stress.norm());
 }
 
+inline void check_reports(MaterialPoints& points, const Tolerances& tolerances) {
+  SCOPED_TRACE("reports are complete once they are committed");
+  auto responses = trial(points, part(gradients(points.size(), tolerances.strain), 0.5));
+  const auto of_trial = responses;
+  commit(points, responses);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t k = 0; k < kReportFields.size(); ++k) {
+      const double before = of_trial[i].report.values[k], after = responses[i].report.values[k];
+      EXPECT_TRUE(std::isfinite(after)) << kReportFields[k] << " of point " << i;
+      EXPECT_TRUE(std::isnan(before) || before == after) << kReportFields[k] << " of point " << i;
+    }
+    for (const char* judged : {"dem_steps", "seconds", "engine_seconds", "unbalanced_force", "contacts"})
+      EXPECT_TRUE(std::isfinite(of_trial[i].report[judged])) << judged << " of point " << i;
+  }
+}
+
 inline void check_saving(MaterialPoints& points, const Tolerances& tolerances) {
   SCOPED_TRACE("save and load");
   const auto F = gradients(points.size(), tolerances.strain);
@@ -179,8 +196,8 @@ inline void check_copies(LocalPoints& points, const Tolerances& tolerances) {
 inline void check(MaterialPoints& points, const Tolerances& tolerances) {
   ASSERT_GE(points.size(), 3U);
   const SavedStates start = points.save();
-  for (const auto& part_of_contract :
-       {check_repetition, check_rejection, check_continuation, check_saving, check_rotation, check_bad_gradients}) {
+  for (const auto& part_of_contract : {check_repetition, check_rejection, check_continuation, check_reports,
+                                       check_saving, check_rotation, check_bad_gradients}) {
     points.load(start);
     part_of_contract(points, tolerances);
   }

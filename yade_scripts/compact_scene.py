@@ -13,6 +13,7 @@ import contact_laws
 import unit_of_time
 
 MAGIC = b"fxdscene"
+LATER = 1 << 62  # a step number after the last look for new contacts, whenever that was
 VERSION = 1
 COHESIVE, FRICTION = 0, 1
 LAWS = {
@@ -184,7 +185,7 @@ def _contact_arrays(O, law, contacts):
     on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, kn * (overlap - cohesive["unp"]), -cohesive["normalAdhesion"])
     waits = np.zeros(m, dtype=np.int64)
     if contact_laws.adhesion_of_new_contacts(O):
-        waits[:] = (_scalars(contacts, "iterMadeReal") >= contact_laws.last_look(O)) & (cohesive["normalAdhesion"] <= 0)
+        waits[:] = (_scalars(contacts, "iterMadeReal") >= contact_laws.looks_for_new_contacts(O)[1]) & (cohesive["normalAdhesion"] <= 0)
     names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     return [
         *(ids, shift, waits, kn, _scalars(phys, "ks")),
@@ -226,7 +227,7 @@ class Scene:
         self.version, self.law, n, m, self.iteration, starts = (int(k) for k in self._take(6))
         self.time_step, self.damping = self._floats(2)
         self.H, self.trsf, self.L, self.previous_L = self._floats(36).reshape(4, 3, 3)
-        self.constants = self._floats(8)
+        self.constants = self._floats(9)
         for name, width in self.SPHERES.items():
             setattr(self, name, self._rows(n, width))
         self.ids, self.shift = self._take(2 * m).reshape(m, 2), self._take(3 * m).reshape(m, 3)
@@ -251,8 +252,8 @@ def write_back(O, exported):
     """Puts a state of the compact engine into the scene of `O`, which rests and was made from the same template.
 
     YADE makes the contacts itself: first between spheres large enough for those that are in tension, then, with their
-    laws, between the true ones; no time passes. Steps without time bring the scene's count to the same place between two
-    looks for new contacts. Raises RuntimeError when YADE's contacts are others.
+    laws, between the true ones; no time passes. The scene's count of steps becomes that of
+    the state. Raises RuntimeError when YADE's contacts are others.
     """
     from yade.utils import Quaternion
 
@@ -261,8 +262,6 @@ def write_back(O, exported):
         raise RuntimeError(f"A state of {len(scene.radius)} spheres does not fit a YADE scene of {len(O.bodies)}.")
     newton, O.dt = O.engines[-1], 0.0
     _set_cell(O, scene, np.zeros((3, 3)))
-    while O.iter % contact_laws.EVERY != (scene.iteration - 2) % contact_laws.EVERY:
-        _again(O)
     _place(O, scene, _enlargement(scene))
     O.interactions.clear()
     _again(O)
@@ -272,6 +271,8 @@ def write_back(O, exported):
     _place(O, scene, 1.0)
     _again(O)
     _set_contacts(_matched(O, scene), scene, "forces", O.iter)
+    if contact_laws.adhesion_of_new_contacts(O):
+        contact_laws.set_looks(O, scene.iteration)
     O.forces.f(0, True)  # YADE forgets nothing in a reset that it has not summed before
     O.forces.reset(False)
     for b, v, w, f, t, turned in zip(O.bodies, scene.v, scene.w, scene.f, scene.t, scene.turned):
@@ -341,7 +342,7 @@ def _set_contacts(contacts, scene, what, now):
             i.geom.normal = tuple(scene.normal[at])
             p.normalForce, p.shearForce = tuple(scene.normal_force[at] * scene.normal[at]), tuple(scene.shear[at])
             continue
-        i.iterMadeReal = now if scene.waits[at] else 0
+        i.iterMadeReal = LATER if scene.waits[at] else 0
         p.kn, p.ks, p.tangensOfFrictionAngle = (float(a[at]) for a in (scene.kn, scene.ks, scene.tangent))
         if cohesive:
             p.normalAdhesion, p.shearAdhesion = float(scene.normal_adhesion[at]), float(scene.shear_adhesion[at])

@@ -117,21 +117,21 @@ def adhesion_of_new_contacts(O):
 def note_restored(O):
     """Notes in the scene that it has just been restored, which has added a step to YADE's count."""
     if adhesion_of_new_contacts(O):
-        added, last = _looks(O)
+        added, last = looks_for_new_contacts(O)
         _note(O, LOOKS_TAG, added + 1, last)
+
+
+def set_looks(O, steps):
+    """Makes the scene's count `steps`, with the last look now: contacts made real from now on wait for the next."""
+    _note(O, LOOKS_TAG, O.iter - steps, O.iter)
 
 
 def steps_made(O):
     """DEM steps of the scene, without those that restoring it has added to YADE's count."""
-    return O.iter - _looks(O)[0]
+    return O.iter - looks_for_new_contacts(O)[0]
 
 
-def last_look(O):
-    """YADE's count of steps at the last look for new contacts: those made real since become adhesive at the next."""
-    return _looks(O)[1]
-
-
-def _looks(O):
+def looks_for_new_contacts(O):
     """Steps that restoring has added to YADE's count, and that count at the last look for new contacts."""
     noted = _noted(O, LOOKS_TAG)
     return (int(noted[0]), int(noted[1])) if noted else (0, O.iter - 2 * EVERY)
@@ -165,7 +165,7 @@ def run(O, steps, new_adhesion):
         for _ in range(steps):
             step()
         return
-    added, last = _looks(O)
+    added, last = looks_for_new_contacts(O)
     for _ in range(steps):
         step()
         if (O.iter - added) % EVERY == 0:

@@ -63,7 +63,7 @@ class Engine:
         from yade.utils import Matrix3
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
-        self._place = {name: k for k, name in enumerate(report_fields)}
+        self.report_fields = list(report_fields)
         self._free, self._trial, self._grains = [], {}, {}  # scene 0 is where templates are made
 
     def versions(self):
@@ -207,9 +207,9 @@ class Engine:
         self._fill(out_report, values)
 
     def _fill(self, out_report, values):
-        for name, value in values.items():
-            if name in self._place:
-                out_report[self._place[name]] = value
+        for k, name in enumerate(self.report_fields):
+            if name in values:
+                out_report[k] = values[name]
 
     def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)

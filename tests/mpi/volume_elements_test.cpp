@@ -76,7 +76,7 @@ TEST(VolumeElements, SameBitsWithWorkers) {
     for (std::size_t i = 0; i < reports.size(); ++i)
       EXPECT_EQ(reports[i]["mean_rotation"], reference.reports()[i]["mean_rotation"]) << "point " << i;
   }
-  EXPECT_GT(farm.points->peak_memory(), static_cast<std::uint64_t>(ranks()) << 20);
+  EXPECT_GT(farm.points->account().peak_memory, static_cast<std::uint64_t>(ranks()) << 20);
 }
 
 TEST(VolumeElements, AnExceptionOnARankTravelsAndTheFarmGoesOn) {
@@ -120,7 +120,7 @@ TEST(VolumeElements, StatisticsCount) {
       kSeven.size() - (kSeven.size() + static_cast<std::size_t>(ranks()) - 1) / static_cast<std::size_t>(ranks());
   EXPECT_GE(statistics.bytes, 2 * remote * (72 + 72));
   EXPECT_EQ(statistics.bytes == 0, ranks() == 1);
-  EXPECT_EQ(farm.points->peak_memory(), 1000 * static_cast<std::uint64_t>(ranks()) + kSeven.size());
+  EXPECT_EQ(farm.points->account().peak_memory, 1000 * static_cast<std::uint64_t>(ranks()) + kSeven.size());
 }
 
 /// Not run by itself: killed_rank.sh kills a rank meanwhile and looks for its worker.

@@ -171,7 +171,7 @@ TEST_F(ResultsTest, AFileInThePlaceOfTheFolderIsRefused) {
 }
 
 StepRecord record(int step) {
-  return {step, 0.1 * step, 1.0 / 3.0, 2, 3, 1e6, 1e-3 / 3, 1.5, 2.5, {-1.0 / 7.0, 1e-300}};
+  return {step, 0.1 * step, 1.0 / 3.0, 2, 3, 1e6, 8, 1e-3 / 3, 1.5, 2.5, {-1.0 / 7.0, 1e-300}};
 }
 
 TEST_F(ResultsTest, HistoryHasOneRowAStepWithTheClockLast) {
@@ -179,8 +179,8 @@ TEST_F(ResultsTest, HistoryHasOneRowAStepWithTheClockLast) {
   History history(folder_ / "history.csv", {"top", "side"}, Existing::refuse);
   history.add(record(1));
   EXPECT_EQ(text("history.csv"),
-            "step,time,load_factor,iterations,evaluations,dem_steps,residual,top,side,dem_seconds,wall_s\n"
-            "1,0.10000000000000001,0.33333333333333331,2,3,1000000,0.00033333333333333332,-0.14285714285714285,"
+            "step,time,load_factor,iterations,evaluations,dem_steps,histories,residual,top,side,dem_seconds,wall_s\n"
+            "1,0.10000000000000001,0.33333333333333331,2,3,1000000,8,0.00033333333333333332,-0.14285714285714285,"
             "1e-300,1.5,2.5\n");
 }
 
