@@ -84,7 +84,7 @@ struct CompactHeader {
   double new_adhesion = 0, new_friction = 0;  ///< that later contacts get: [N], NaN: none; shear over normal adhesion
   double constant_kn = 0, constant_ks = 0;    ///< of later contacts [N/m]; NaN: from the materials
   double safety = std::numeric_limits<double>::quiet_NaN();  ///< of the time step; NaN: it follows nothing
-  double density = 0, mean_diameter = 0, solid_volume = 0;  ///< [kg/m^3], [m], [m^3]
+  double density = 0, mean_diameter = 0, solid_volume = 0;   ///< [kg/m^3], [m], [m^3]
   double in_a_second = 1;  ///< units of time, in which all but the density counts (yade_scripts/unit_of_time.py)
 };
 

@@ -247,6 +247,24 @@ CompactBlock block_of_scene(std::string_view exported) {
   return block;
 }
 
+bool same_state(std::string_view one, std::string_view other) {
+  if (one.substr(0, kMagic.size()) != kMagic) throw UserError("this is not the export of a YADE scene");
+  Reader reader(one.substr(kMagic.size()));
+  const Head head = read_head(reader);
+  const auto n = static_cast<std::size_t>(head.spheres);
+  const std::size_t turned = one.size() - reader.left() + 8 * 15 * n, end = turned + 8 * 4 * n;
+  if (one.size() != other.size() || one.substr(0, turned) != other.substr(0, turned) ||
+      one.substr(end) != other.substr(end))
+    return false;
+  for (std::size_t at = turned; at < end; at += 8) {
+    double a = 0, b = 0;
+    std::memcpy(&a, one.data() + at, 8);
+    std::memcpy(&b, other.data() + at, 8);
+    if (!(std::abs(a - b) <= 1e-12)) return false;
+  }
+  return true;
+}
+
 std::string scene_of_block(const CompactBlock& block) {
   const CompactArrays& a = block.arrays();
   const CompactHeader& h = *a.header;

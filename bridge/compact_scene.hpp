@@ -22,4 +22,8 @@ namespace femxdem {
 CompactBlock block_of_scene(std::string_view exported);
 std::string scene_of_block(const CompactBlock& block);
 
+/// Whether two exports are equal to the bit, but for the grains' rotations since the reference, which decide nothing
+/// and are products of quaternions: those within 1e-12. Throws UserError when one is something else.
+bool same_state(std::string_view one, std::string_view other);
+
 }  // namespace femxdem

@@ -175,8 +175,7 @@ void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
   }
   trial.response.report = cell.trial_report();
   Strained found{tensor(cell.stress()), tensor(cell.stretch()), {}};
-  if (wanted == Operator::elastic)
-    found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
+  if (wanted == Operator::elastic) found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
   judge(options_, trial.straining, trial.first, found, trial.response);
 }
 
@@ -194,9 +193,10 @@ void CompactVolumeElements::check(const Trial& trial) {
   std::string L;
   for (const double value : trial.straining.velocity_gradient) L += fmt::format(" {:a}", value);
   std::ofstream(file.string() + ".txt") << fmt::format("steps {}\nvelocity_gradient{}\n", trial.straining.steps, L);
-  throw EngineDiffers(fmt::format("compact volume element {}: {}; its state and the trial are in {}; set ve.engine = "
-                                  "\"yade\" and report it",
-                                  trial.first, *difference, file.string()));
+  throw EngineDiffers(
+      fmt::format("compact volume element {}: {}; its state and the trial are in {}; set ve.engine = "
+                  "\"yade\" and report it",
+                  trial.first, *difference, file.string()));
 }
 
 void CompactVolumeElements::commit() {

@@ -15,7 +15,7 @@ namespace femxdem {
 /// How the compact volume elements of a rank are shared out and checked.
 struct CompactOptions {
   int threads = 1;
-  double check_share = 0;         ///< of the trials that YADE repeats, at random [-]
+  double check_share = 0;          ///< of the trials that YADE repeats, at random [-]
   std::filesystem::path evidence;  ///< folder for the data of a trial that YADE answers otherwise
 };
 
@@ -52,8 +52,8 @@ class CompactVolumeElements : public LocalPoints {
   struct Point {
     Cell cell;
     StrainedPoint strained;
-    double time_step = 0;      ///< [s]
-    PointReport report;        ///< of the last commit, complete
+    double time_step = 0;  ///< [s]
+    PointReport report;    ///< of the last commit, complete
   };
   /// What one cell is asked for by one or more points.
   struct Trial {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "compact_scene.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -58,7 +60,7 @@ std::optional<std::string> Referee::difference(std::uint64_t origin, const Compa
   task += committed.to_scene();
   const Reply reply = worker_.request(Command::referee, at - origins_.begin(), straining.steps, task);
   const std::string yades = worker_.mail(reply);
-  if (kToTheBit && yades == trial.to_scene()) return std::nullopt;
+  if (kToTheBit && same_state(yades, trial.to_scene())) return std::nullopt;
   const double stress = relative(trial.stress(), CompactCell::from_scene(yades).stress());
   if (!kToTheBit && stress <= kRoundOff) return std::nullopt;
   return fmt::format("after {} DEM steps from the same state YADE ends in another one (stress {:.1e} apart, relative)",

@@ -271,8 +271,7 @@ def write_back(O, exported):
     _place(O, scene, 1.0)
     _again(O)
     _set_contacts(_matched(O, scene), scene, "forces", O.iter)
-    if contact_laws.adhesion_of_new_contacts(O):
-        contact_laws.set_looks(O, scene.iteration)
+    contact_laws.set_looks(O, scene.iteration)
     O.forces.f(0, True)  # YADE forgets nothing in a reset that it has not summed before
     O.forces.reset(False)
     for b, v, w, f, t, turned in zip(O.bodies, scene.v, scene.w, scene.f, scene.t, scene.turned):

@@ -16,9 +16,9 @@ struct Summary {
   long evaluations = 0;  ///< of all material points
   double dem_steps = 0;  ///< over all points and evaluations
   int ranks = 1;
-  int threads = 1;           ///< of each rank
-  std::string engine;        ///< of volume elements; empty: laws in closed form
-  std::string engine_check;  ///< "23 of 23 trials equal YADE's to the bit"; empty: none was repeated
+  int threads = 1;                        ///< of each rank
+  std::string engine;                     ///< of volume elements; empty: laws in closed form
+  std::string engine_check;               ///< "23 of 23 trials equal YADE's to the bit"; empty: none was repeated
   double wall_seconds = 0;                ///< of the run
   double evaluate_seconds = 0;            ///< wall time inside MaterialPoints::evaluate
   double trial_seconds = 0;               ///< of the points' trials, summed over the ranks
@@ -31,7 +31,8 @@ struct Summary {
 };
 
 /// JSON of the summary with what follows from it: `parallel_efficiency` = trial seconds / (ranks x threads x wall
-/// seconds of evaluate), `engine_share` = engine seconds / (the same), `overhead_ratio` = 1 - engine_share; null where unknown.
+/// seconds of evaluate), `engine_share` = engine seconds / (the same), `overhead_ratio` = 1 - engine_share; null where
+/// unknown.
 std::string to_json(const Summary& summary, const std::string& date, const std::string& host);
 
 /// Writes it with the date (UTC, ISO 8601) and the name of this machine.

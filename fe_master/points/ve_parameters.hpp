@@ -42,10 +42,11 @@ struct VeParameters {
   VeStiffness stiffness = VeStiffness::affine;
   Snapshot snapshot = Snapshot::fork;
   EngineChoice engine = EngineChoice::automatic;  ///< compact cells where they cover the scene and equal YADE's bits
-  int check_every = 0;           ///< one trial of compact cells in so many is repeated in YADE; 0: about 20 a run
-  int threads = 0;               ///< of a rank, for compact cells; 0: the processors that it may use
-  bool sorted_contacts = false;  ///< YADE sums forces in the order of the spheres, as compact cells do: slower, same bits
-  std::vector<int> seeds;                    ///< pool of VEs, or empty: only seed
+  int check_every = 0;  ///< one trial of compact cells in so many is repeated in YADE; 0: about 20 a run
+  int threads = 0;      ///< of a rank, for compact cells; 0: the processors that it may use
+  bool sorted_contacts =
+      false;               ///< YADE sums forces in the order of the spheres, as compact cells do: slower, same bits
+  std::vector<int> seeds;  ///< pool of VEs, or empty: only seed
   Assignment assignment = Assignment::same;  ///< of the pool to the elements
   int assignment_seed = 1;
   std::string cache;  ///< folder of prepared packings, absolute path; empty: the caller chooses

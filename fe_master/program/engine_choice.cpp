@@ -15,7 +15,7 @@
 namespace femxdem {
 namespace {
 
-constexpr long kSteps = 20;          // in which every template is compared at the start
+constexpr long kSteps = 20;           // in which every template is compared at the start
 constexpr double kChecksOfARun = 20;  // where the case does not say how many
 
 /// Why compact cells may not stand for this template; nothing where they may.
@@ -50,13 +50,13 @@ EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std
   for (std::size_t t = 0; t < states.size(); ++t) {
     const auto why_not = objection(referee, states[t]);
     if (!why_not) continue;
-    const std::string sentence = fmt::format("volume element {} of {} cannot be a compact cell: {}", t + 1,
-                                             states.size(), *why_not);
+    const std::string sentence =
+        fmt::format("volume element {} of {} cannot be a compact cell: {}", t + 1, states.size(), *why_not);
     if (asked == EngineChoice::compact) throw UserError(sentence + "; set ve.engine = \"auto\" or \"yade\"");
     return {EngineKind::yade, "engine: YADE; " + sentence};
   }
-  return {EngineKind::compact, fmt::format("engine: compact cells; every template equals YADE's to the bit over {} steps",
-                                           kSteps)};
+  return {EngineKind::compact,
+          fmt::format("engine: compact cells; every template equals YADE's to the bit over {} steps", kSteps)};
 }
 
 WorkerCommand worker_command(const VeParameters& ve) {

@@ -18,16 +18,17 @@ struct EngineVerdict {
   std::string sentence;  ///< for the log
 };
 
-/// What ve.engine asks for. Compact cells are taken where they cover every template and where each template, strained in
-/// both engines for 20 steps, ends in the same state to the bit; else "auto" is YADE and the sentence says why, and
+/// What ve.engine asks for. Compact cells are taken where they cover every template and where each template, strained
+/// in both engines for 20 steps, ends in the same state to the bit; else "auto" is YADE and the sentence says why, and
 /// "compact" is a UserError. states: of the templates, as make_templates gives them.
 EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std::vector<std::string>& states);
 
 /// The worker of a rank for these volume elements.
 WorkerCommand worker_command(const VeParameters& ve);
 
-/// The volume elements of this rank. trials: how many the run expects of it, for the sample that YADE repeats; evidence:
-/// where the data of a trial go that it answers otherwise; ranks: on this machine, which share its processors.
+/// The volume elements of this rank. trials: how many the run expects of it, for the sample that YADE repeats;
+/// evidence: where the data of a trial go that it answers otherwise; ranks: on this machine, which share its
+/// processors.
 std::unique_ptr<LocalPoints> make_local_points(EngineKind engine, WorkerProcess& worker, const VeParameters& ve,
                                                double trials, const std::filesystem::path& evidence, int ranks);
 

@@ -60,8 +60,7 @@ int path_of_volume_element(const Case& c, VeArguments& arguments) {
   arguments.options.versions.merge(engine_versions(maker));
   const EngineVerdict verdict = choose_engine(c.ve.engine, worker, {state});
   arguments.options.remarks.push_back(verdict.sentence);
-  const auto point =
-      make_local_points(verdict.engine, worker, c.ve, expected_trials(c), arguments.options.folder, 1);
+  const auto point = make_local_points(verdict.engine, worker, c.ve, expected_trials(c), arguments.options.folder, 1);
   arguments.options.complete = [&](Summary& summary) {
     summary.peak_memory_workers = point->peak_memory();
     summary.threads = point->threads();

@@ -24,7 +24,7 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
-  std::vector<std::string> remarks;  ///< for the beginning of the log
+  std::vector<std::string> remarks;                          ///< for the beginning of the log
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 
