@@ -15,7 +15,7 @@ struct Equilibrium;
 ///   opening: mean displacement against the outward normal of the undeformed edge, a cavity that widens is positive
 ///   [m];
 ///   volume: growth of the volume on the edge's outer side (Formulation::swept_volume), in plane strain swept about the
-///   origin and per thickness [m^2], exact for an arc whose ends move on rays through the origin.
+///   origin and per thickness [m^2], exact for an arc whose ends move on rays through the origin; axisymmetric [m^3].
 /// With against_edge, the same mean of that edge is subtracted (indirect control across a band).
 class ControlMeasure {
  public:

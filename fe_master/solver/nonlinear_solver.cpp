@@ -8,7 +8,6 @@
 #include <limits>
 #include <random>
 
-#include "convergence.hpp"
 #include "errors.hpp"
 
 namespace femxdem {
@@ -123,12 +122,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
     search.start(now.residual);
     move(trial, z + change);
   }
-  if (accept_best(best, result)) {
-    commit(best, dt);
-  } else if (result.reason.empty() && !result.failure) {
-    result.reason = history.verdict();
-    if (history.least() <= parameters_.tolerance) result.reason += unmet(result);
-  }
+  give_up(best, dt, history, result);
   return result;
 }
 
@@ -336,6 +330,16 @@ bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
   result.reason.clear();
   result.converged = result.best_accepted = true;
   return true;
+}
+
+/// The end of a step whose iterations have not converged: its best iterate, or the reason why not.
+void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistory& history, StepResult& result) {
+  if (accept_best(best, result)) {
+    commit(best, dt);
+  } else if (result.reason.empty() && !result.failure) {
+    result.reason = history.verdict();
+    if (history.least() <= parameters_.tolerance) result.reason += unmet(result);
+  }
 }
 
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {

@@ -7,6 +7,7 @@
 #include "acceleration.hpp"
 #include "assembler.hpp"
 #include "control.hpp"
+#include "convergence.hpp"
 #include "formulation.hpp"
 #include "linear_solver.hpp"
 #include "loads.hpp"
@@ -101,6 +102,7 @@ class NonlinearSolver {
   AndersonAcceleration acceleration() const;
   bool converged(const Iteration& iteration) const;
   bool accept_best(Equilibrium& best, StepResult& result);
+  void give_up(Equilibrium& best, double dt, const ResidualHistory& history, StepResult& result);
   void commit(Equilibrium& trial, double dt);
   Eigen::VectorXd scaled_residual(const Equilibrium& state) const;
   std::vector<double> of_elements(const Eigen::VectorXd& residual) const;
