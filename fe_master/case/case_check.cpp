@@ -9,6 +9,7 @@
 #include <set>
 
 #include "errors.hpp"
+#include "formulation.hpp"
 #include "mesh.hpp"
 
 namespace femxdem {
@@ -81,6 +82,16 @@ void check_points(const Case& c, const Mesh& mesh, Mistakes& m) {
   }
 }
 
+/// What the formulation has to say about the mesh.
+void check_formulation(const Case& c, const Mesh& mesh, Mistakes& m) {
+  if (m.wrong("element")) return;
+  try {
+    make_formulation(c.element, mesh);
+  } catch (const UserError& error) {
+    m.add("mesh", error.what());
+  }
+}
+
 /// Names of the mesh's edges, as far as they can be known.
 std::optional<std::set<std::string>> edge_names(const Case& c, const std::optional<Mesh>& mesh, const Mistakes& m) {
   std::set<std::string> names;
@@ -128,6 +139,8 @@ std::set<std::string> check_regions(const Case& c, const std::optional<Mesh>& me
 // -------------------------------------------------------------------------------
 
 void check_element(const Case& c, Mistakes& m) {
+  if (c.element.type == ElementType::axisymmetric)
+    refuse(m, "element", {"D", "mindlin"}, "element.type = \"axisymmetric\"");
   if (c.element.type != ElementType::second_gradient || m.wrong("element")) return;
   const bool D = m.has("element.D"), mindlin = m.has("element.mindlin");
   if (!D && !mindlin) m.add("element", "element.type = \"second_gradient\" needs a modulus; give element.D (in N)");
@@ -380,6 +393,8 @@ void check_case(const Case& c, Purpose purpose, Mistakes& m) {
     check_region_names(c.material_regions, "material.region", regions, m);
     check_region_names(c.ve_regions, "ve.region", regions, m);
     check_points(c, *mesh, m);
+    check_formulation(c, *mesh, m);
+    check_axis(c, *mesh, m);
   }
   const std::optional<std::set<std::string>> edges = edge_names(c, mesh, m);
   check_loads(c, edges, m);

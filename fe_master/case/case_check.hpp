@@ -7,6 +7,7 @@
 
 #include "case.hpp"
 #include "case_mistakes.hpp"
+#include "mesh.hpp"
 
 namespace femxdem {
 
@@ -18,6 +19,9 @@ void check_case(const Case& c, Purpose purpose, Mistakes& mistakes);
 
 /// The part of check_case that concerns [[load]]; without a mesh its edges are not known.
 void check_loads(const Case& c, const std::optional<std::set<std::string>>& edges, Mistakes& mistakes);
+
+/// Axisymmetric elements: an edge on the axis x = 0 has no radial displacement, which a load must say.
+void check_axis(const Case& c, const Mesh& mesh, Mistakes& mistakes);
 
 /// Adds a mistake for each key of a section that the file does not have.
 void require(Mistakes& mistakes, const std::string& section, const std::vector<std::string>& keys,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "case_check.hpp"
 
@@ -71,16 +72,34 @@ bool holds(const Case& c, Component component) {
   });
 }
 
+bool is_held(const Case& c, const std::string& edge, Component component) {
+  return std::any_of(c.loads.begin(), c.loads.end(), [&](const Load& load) {
+    return load.edge == edge && prescribes_motion(load.kind) && load.component == component;
+  });
+}
+
 bool fully_held(const Case& c, const std::string& edge) {
-  const auto held = [&](Component component) {
-    return std::any_of(c.loads.begin(), c.loads.end(), [&](const Load& load) {
-      return load.edge == edge && prescribes_motion(load.kind) && load.component == component;
-    });
-  };
-  return held(Component::x) && held(Component::y);
+  return is_held(c, edge, Component::x) && is_held(c, edge, Component::y);
 }
 
 }  // namespace
+
+void check_axis(const Case& c, const Mesh& mesh, Mistakes& m) {
+  if (c.element.type != ElementType::axisymmetric || m.wrong("element")) return;
+  double radius = 0;
+  for (const Point2& X : mesh.nodes) radius = std::max(radius, X.x());
+  for (const auto& [name, sides] : mesh.edges) {
+    const bool on_axis = std::all_of(sides.begin(), sides.end(), [&](const Side& side) {
+      return std::all_of(side.nodes.begin(), side.nodes.end(),
+                         [&](int node) { return std::abs(mesh.nodes[node].x()) <= 1e-9 * radius; });
+    });
+    if (on_axis && !is_held(c, name, Component::x))
+      m.add("load",
+            fmt::format("edge '{0}' lies on the axis of axisymmetric elements, where nothing moves along x; add "
+                        "[[load]] edge = \"{0}\", kind = \"displacement\", component = \"x\", value = 0",
+                        name));
+  }
+}
 
 void check_loads(const Case& c, const std::optional<std::set<std::string>>& edges, Mistakes& m) {
   for (std::size_t i = 0; i < c.loads.size(); ++i) {
@@ -97,6 +116,7 @@ void check_loads(const Case& c, const std::optional<std::set<std::string>>& edge
   }
   if (m.wrong("load")) return;
   for (const auto& [component, name] : {std::pair{Component::x, "x"}, std::pair{Component::y, "y"}}) {
+    if (component == Component::x && c.element.type == ElementType::axisymmetric) continue;  // the hoops hold it
     if (!holds(c, component))
       m.add("load",
             fmt::format("nothing holds the mesh in {0}; prescribe a displacement in {0} on an edge, or pin a node: "

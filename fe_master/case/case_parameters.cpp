@@ -104,8 +104,10 @@ Section<Region> region_section() {
 Section<ElementParameters> element_section() {
   using E = ElementParameters;
   return {"element",
-          "plane strain, 2 x 2 Gauss points",
-          {word("type", &E::type, {"q8", "second_gradient"}, "8-node u; second_gradient adds v_ij and lambda_ij"),
+          "8-node quadrilaterals, 2 x 2 Gauss points",
+          {word("type", &E::type, {"q8", "second_gradient", "axisymmetric"},
+                "q8: plane strain; second_gradient adds v_ij and lambda_ij; axisymmetric: about x = 0, x being the "
+                "radius, y the axis, zz the circumference"),
            parameter("D", &E::D, "N", kPositive, "second-gradient modulus, band thickness goes as sqrt(D)"),
            parameter("mindlin", &E::mindlin, "N", kAny, "a1, ..., a5 of the general isotropic law, instead of D", 5)}};
 }
@@ -227,10 +229,10 @@ Section<ControlParameters> control_section() {
        parameter("loads", &C::loads, "", kAny, "edges whose tractions and pressures have the unknown factor"),
        word("measure", &C::measure, {"displacement_x", "displacement_y", "opening", "volume"},
             "of measure_edge: mean displacement; opening: against the outward normal; volume: of the cavity about the "
-            "origin"),
+            "origin [m2], or about the axis of axisymmetric elements [m3]"),
        parameter("measure_edge", &C::measure_edge, "", kAny, "edge that is measured"),
        parameter("against_edge", &C::against_edge, "", kAny, "edge whose mean is subtracted"),
-       parameter("rate", &C::rate, "m/s, m2/s", kAny, "of the measure, for mode = \"measure\"")}};
+       parameter("rate", &C::rate, "m/s, m2/s, m3/s", kAny, "of the measure, for mode = \"measure\"")}};
 }
 
 Section<SolverParameters> solver_section() {
@@ -288,8 +290,8 @@ Section<Monitor> monitor_section() {
            word("quantity", &Monitor::quantity,
                 {"reaction_x", "reaction_y", "displacement_x", "displacement_y", "length", "pressure", "stress_xx",
                  "stress_yy", "stress_zz", "stress_xy"},
-                "reaction: sum over the edge [N/m]; displacement: mean over the edge [m]; stress: mean over the region "
-                "[Pa]"),
+                "reaction: sum over the edge [N/m; axisymmetric N, of the full circumference]; displacement: mean over "
+                "the edge [m]; stress: mean over the region [Pa]"),
            parameter("edge", &Monitor::edge, "", kAny, "edge of the mesh; all but stresses"),
            parameter("region", &Monitor::region, "", kAny, "region of a stress; default: the whole mesh")}};
 }

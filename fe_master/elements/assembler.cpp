@@ -4,18 +4,18 @@
 
 namespace femxdem {
 
-Assembler::Assembler(const Element& element, const std::vector<int>& prescribed)
-    : element_(element), equation_(element.unknowns(), 0) {
+Assembler::Assembler(const Formulation& formulation, const std::vector<int>& prescribed)
+    : formulation_(formulation), equation_(formulation.unknowns(), 0) {
   for (const int dof : prescribed) equation_[dof] = -1;
-  for (int dof = 0; dof < element.unknowns(); ++dof) {
+  for (int dof = 0; dof < formulation.unknowns(); ++dof) {
     if (equation_[dof] < 0) continue;
     equation_[dof] = static_cast<int>(free_.size());
     free_.push_back(dof);
   }
   const int n = static_cast<int>(free_.size());
   std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t e = 0; e < element.mesh().elements.size(); ++e) {
-    dofs_.push_back(element.dofs(static_cast<int>(e)));
+  for (std::size_t e = 0; e < formulation.mesh().elements.size(); ++e) {
+    dofs_.push_back(formulation.dofs(static_cast<int>(e)));
     for (const int i : dofs_.back()) {
       for (const int j : dofs_.back()) {
         if (equation_[i] >= 0 && equation_[j] >= 0) entries.emplace_back(equation_[i], equation_[j], 1.0);
@@ -42,35 +42,28 @@ Assembler::Assembler(const Element& element, const std::vector<int>& prescribed)
   }
 }
 
-Eigen::VectorXd Assembler::force(const Eigen::VectorXd& x, std::span<const Tensor2> F,
-                                 std::span<const Tensor2> stress) const {
-  Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
+Eigen::VectorXd Assembler::force(const Configuration& at, std::span<const Tensor2> stress) const {
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (std::size_t e = 0; e < dofs_.size(); ++e) {
-    const std::size_t first = kPointsPerElement * e;
-    const Eigen::VectorXd f_e = element_.force(static_cast<int>(e), x, F.subspan(first, kPointsPerElement),
-                                               stress.subspan(first, kPointsPerElement));
-    for (std::size_t i = 0; i < dofs_[e].size(); ++i) f[dofs_[e][i]] += f_e[static_cast<Eigen::Index>(i)];
-  }
-  return f;
-}
-
-Eigen::VectorXd Assembler::constraint_force(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
-  for (std::size_t e = 0; e < dofs_.size(); ++e) {
-    const Eigen::VectorXd f_e = element_.constraint_force(static_cast<int>(e), x);
+    const Eigen::VectorXd f_e = formulation_.force(static_cast<int>(e), at, stress);
     for (Eigen::Index i = 0; i < f_e.size(); ++i) f[dofs_[e][i]] += f_e[i];
   }
   return f;
 }
 
-const SparseMatrix& Assembler::matrix(const Eigen::VectorXd& x, std::span<const Tensor2> F,
-                                      std::span<const Tensor4> dPdF, bool exact, const Eigen::VectorXd& change,
-                                      Eigen::VectorXd& rhs) {
+Eigen::VectorXd Assembler::constraint_force(const Eigen::VectorXd& x, double penalty) const {
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(formulation_.unknowns());
+  for (std::size_t e = 0; e < dofs_.size(); ++e) {
+    const Eigen::VectorXd f_e = formulation_.constraint_force(static_cast<int>(e), x, penalty);
+    for (Eigen::Index i = 0; i < f_e.size(); ++i) f[dofs_[e][i]] += f_e[i];
+  }
+  return f;
+}
+
+const SparseMatrix& Assembler::matrix(const Linearisation& at, const Eigen::VectorXd& change, Eigen::VectorXd& rhs) {
   std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0);
   for (std::size_t e = 0; e < dofs_.size(); ++e) {
-    const std::size_t first = kPointsPerElement * e;
-    const Eigen::MatrixXd K = element_.matrix(static_cast<int>(e), x, F.subspan(first, kPointsPerElement),
-                                              dPdF.subspan(first, kPointsPerElement), exact);
+    const Eigen::MatrixXd K = formulation_.matrix(static_cast<int>(e), at);
     const int* place = places_[e].data();
     const int n = static_cast<int>(dofs_[e].size());
     for (int j = 0; j < n; ++j) {

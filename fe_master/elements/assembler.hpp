@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "element.hpp"
+#include "formulation.hpp"
 
 namespace femxdem {
 
@@ -14,21 +14,20 @@ using SparseMatrix = Eigen::SparseMatrix<double>;
 class Assembler {
  public:
   /// prescribed: unknowns that are not free, ascending.
-  Assembler(const Element& element, const std::vector<int>& prescribed);
+  Assembler(const Formulation& formulation, const std::vector<int>& prescribed);
 
   /// Free unknowns, ascending: equation i of the system is unknown free()[i].
   const std::vector<int>& free() const { return free_; }
-  /// Internal force of all unknowns from the Cauchy stresses of all points [N/m].
-  Eigen::VectorXd force(const Eigen::VectorXd& x, std::span<const Tensor2> F, std::span<const Tensor2> stress) const;
-  /// What the constraints add on the right-hand side of a correction, all unknowns.
-  Eigen::VectorXd constraint_force(const Eigen::VectorXd& x) const;
-  /// Matrix of the free unknowns from dP/dF of all points. `change` (all unknowns): known changes of the prescribed
-  /// ones, whose product with the matrix is subtracted from `rhs` (free unknowns).
-  const SparseMatrix& matrix(const Eigen::VectorXd& x, std::span<const Tensor2> F, std::span<const Tensor4> dPdF,
-                             bool exact, const Eigen::VectorXd& change, Eigen::VectorXd& rhs);
+  /// Internal force of all unknowns from the Cauchy stresses of all points [N per thickness; N].
+  Eigen::VectorXd force(const Configuration& at, std::span<const Tensor2> stress) const;
+  /// What the constraints add on the right-hand side of a correction, all unknowns; penalty [Pa].
+  Eigen::VectorXd constraint_force(const Eigen::VectorXd& x, double penalty) const;
+  /// Matrix of the free unknowns. `change` (all unknowns): known changes of the prescribed ones, whose product with
+  /// the matrix is subtracted from `rhs` (free unknowns).
+  const SparseMatrix& matrix(const Linearisation& at, const Eigen::VectorXd& change, Eigen::VectorXd& rhs);
 
  private:
-  const Element& element_;
+  const Formulation& formulation_;
   std::vector<int> free_;
   std::vector<int> equation_;             // of an unknown, -1 where it is prescribed
   std::vector<std::vector<int>> dofs_;    // of each element

@@ -6,7 +6,7 @@
 
 namespace femxdem {
 
-enum class ElementType { q8, second_gradient };
+enum class ElementType { q8, second_gradient, axisymmetric };
 struct ElementParameters {
   ElementType type = ElementType::q8;
   double D = kNotGiven;         ///< second-gradient modulus, formulation with one parameter [N]

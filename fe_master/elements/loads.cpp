@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "edge_samples.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -62,21 +64,21 @@ double load_factor(const Load& load, double time, double end_time) {
   return 1.0;
 }
 
-Loads::Loads(const Element& element, double end_time) : element_(element), end_time_(end_time) {}
+Loads::Loads(const Formulation& formulation, double end_time) : formulation_(formulation), end_time_(end_time) {}
 
 void Loads::add(const Load& load) {
   if (load.kind == LoadKind::traction || load.kind == LoadKind::pressure) {
     forces_.push_back(load);
     return;
   }
-  const Mesh& mesh = element_.mesh();
+  const Mesh& mesh = formulation_.mesh();
   const std::vector<int> nodes = load.point.empty()
                                      ? edge_nodes(mesh, load.edge)
                                      : std::vector<int>{nearest_node(mesh, Point2(load.point[0], load.point[1]))};
   const auto value = [load, end_time = end_time_](double t) { return load.value * load_factor(load, t, end_time); };
   for (const int node : nodes) {
     const int i = component_index(load.component);
-    const int dof = load.kind == LoadKind::gradient ? element_.gradient_dof(node, i) : 2 * node + i;
+    const int dof = load.kind == LoadKind::gradient ? formulation_.gradient_dof(node, i) : 2 * node + i;
     if (dof >= 0) prescribe(dof, value);
   }
 }
@@ -98,7 +100,7 @@ std::vector<int> Loads::prescribed_dofs() const {
 }
 
 Eigen::VectorXd Loads::prescribed(double t_n, double t) const {
-  const int displacements = 2 * static_cast<int>(element_.mesh().nodes.size());
+  const int displacements = 2 * static_cast<int>(formulation_.mesh().nodes.size());
   Eigen::VectorXd values(prescribed_.size());
   for (std::size_t i = 0; i < prescribed_.size(); ++i) {
     const auto& [dof, value] = prescribed_[i];
@@ -119,7 +121,7 @@ double Loads::released_factor(double t) const {
 }
 
 Eigen::VectorXd Loads::released_force(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (const Load& load : forces_) {
     if (is_released(load)) add_edge_force(load, x, load.value, f);
   }
@@ -131,44 +133,40 @@ Eigen::VectorXd Loads::external_force(const Eigen::VectorXd& x, double t) const 
 }
 
 Eigen::VectorXd Loads::external_force(const Eigen::VectorXd& x, double t, double released_factor) const {
-  Eigen::VectorXd f = Eigen::VectorXd::Zero(element_.unknowns());
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (const Load& load : forces_) {
     const double factor = is_released(load) ? released_factor : load_factor(load, t, end_time_);
     add_edge_force(load, x, load.value * factor, f);
   }
-  if (body_force.x == 0 && body_force.y == 0) return f;
-  const std::vector<Tensor2> F = element_.deformation(x);
-  for (std::size_t p = 0; p < element_.points(); ++p) {
-    const QuadraturePoint& g = gauss_2x2()[p % kPointsPerElement];
-    const Shape8 N = shape_q8(g.xi, g.eta);
-    const double weight = element_.shapes(p).weight * F[p].determinant();
-    for (int a = 0; a < 8; ++a) {
-      const int node = element_.mesh().elements[p / kPointsPerElement][a];
-      f.segment<2>(2 * node) += weight * N[a] * Point2(body_force.x, body_force.y);
-    }
-  }
+  if (body_force.x != 0 || body_force.y != 0) add_body_force(x, f);
   return f;
 }
 
-void Loads::add_edge_force(const Load& load, const Eigen::VectorXd& x, double value, Eigen::VectorXd& f) const {
-  const Mesh& mesh = element_.mesh();
-  for (const Side& side : mesh.edges.at(load.edge)) {
-    for (const EdgePoint& g : gauss_edge()) {
-      const Eigen::Vector3d N = shape_edge(g.s), dN = shape_gradient_edge(g.s);
-      Point2 tangent = Point2::Zero();  // d(position)/ds, reference for tractions, current for pressures
-      for (int a = 0; a < 3; ++a) {
-        const int node = side.nodes[a];
-        tangent += dN[a] * mesh.nodes[node];
-        if (load.kind == LoadKind::pressure) tangent += dN[a] * x.segment<2>(2 * node);
-      }
-      Point2 force = Point2::Zero();
-      if (load.kind == LoadKind::pressure) {
-        force = -value * Point2(tangent.y(), -tangent.x());  // outward normal times length: material on the left
-      } else {
-        force[component_index(load.component)] = value * tangent.norm();
-      }
-      for (int a = 0; a < 3; ++a) f.segment<2>(2 * side.nodes[a]) += g.weight * N[a] * force;
+void Loads::add_body_force(const Eigen::VectorXd& x, Eigen::VectorXd& f) const {
+  const std::vector<Tensor2> F = formulation_.deformation(x);
+  for (std::size_t p = 0; p < formulation_.points(); ++p) {
+    const PointShapes& s = formulation_.shapes(p);
+    const double weight = s.weight * F[p].determinant();
+    for (int a = 0; a < 8; ++a) {
+      const int node = formulation_.mesh().elements[p / kPointsPerElement][a];
+      f.segment<2>(2 * node) += weight * s.N8[a] * Point2(body_force.x, body_force.y);
     }
+  }
+}
+
+/// Tractions act on the reference configuration, pressures on the current one.
+void Loads::add_edge_force(const Load& load, const Eigen::VectorXd& x, double value, Eigen::VectorXd& f) const {
+  const bool follows = load.kind == LoadKind::pressure;
+  const Mesh& mesh = formulation_.mesh();
+  for (const EdgeSample& g : follows ? edge_samples(mesh, load.edge, x) : edge_samples(mesh, load.edge)) {
+    Point2 force = Point2::Zero();
+    if (follows) {
+      force = -value * outward_normal(g.tangent);
+    } else {
+      force[component_index(load.component)] = value * g.tangent.norm();
+    }
+    const double weight = g.weight * formulation_.thickness(g.position);
+    for (int a = 0; a < 3; ++a) f.segment<2>(2 * g.nodes[a]) += weight * g.N[a] * force;
   }
 }
 

@@ -204,17 +204,4 @@ Point2 element_centre(const Mesh& mesh, int element) {
   return sum / 4.0;
 }
 
-double edge_length(const Mesh& mesh, const std::string& edge) {
-  double length = 0.0;
-  for (const Side& side : mesh.edges.at(edge)) {
-    for (const EdgePoint& point : gauss_edge()) {
-      const Eigen::Vector3d gradient = shape_gradient_edge(point.s);
-      Point2 tangent = Point2::Zero();
-      for (int a = 0; a < 3; ++a) tangent += gradient[a] * mesh.nodes[side.nodes[a]];
-      length += point.weight * tangent.norm();
-    }
-  }
-  return length;
-}
-
 }  // namespace femxdem

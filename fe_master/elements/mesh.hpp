@@ -58,7 +58,4 @@ void check_mesh(const Mesh& mesh);
 /// Centre of an element: mean of its corners [m].
 Point2 element_centre(const Mesh& mesh, int element);
 
-/// Lengths of the sides of a named edge along their quadratic shape, summed [m].
-double edge_length(const Mesh& mesh, const std::string& edge);
-
 }  // namespace femxdem

@@ -6,7 +6,7 @@ namespace femxdem {
 
 enum class Quantity {
   reaction_x,
-  reaction_y,  ///< sum over the edge [N/m]
+  reaction_y,  ///< sum over the edge [N per thickness; axisymmetric N, of the full circumference]
   displacement_x,
   displacement_y,  ///< mean over the edge [m]
   length,          ///< of the deformed edge [m]
@@ -14,7 +14,7 @@ enum class Quantity {
   stress_xx,
   stress_yy,
   stress_zz,
-  stress_xy  ///< volume mean over the region, or over the mesh [Pa]
+  stress_xy  ///< rr, zz, tt, rz of axisymmetric elements; volume mean over the region, or over the mesh [Pa]
 };
 /// A column of history.csv.
 struct Monitor {

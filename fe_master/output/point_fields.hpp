@@ -1,20 +1,13 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
+#include "field.hpp"
 #include "material_points.hpp"
 #include "tensor.hpp"
 
 namespace femxdem {
-
-/// Values of one quantity at all nodes or at all Gauss points: `components` numbers each, tensors row by row.
-struct Field {
-  std::string name;
-  std::size_t components = 1;
-  std::vector<double> values;
-};
 
 /// What a results file holds of every Gauss point, in the order of the points:
 /// `stress` (3 x 3, Cauchy, tension positive) [Pa], `deformation_gradient` (3 x 3), `mean_stress` tr(sigma) / 3 [Pa],

@@ -34,17 +34,6 @@ Tensor4 rotate(const Tensor4& C, const Tensor2& R) {
   return Q * C * Q.transpose();
 }
 
-Tensor4 minor_symmetric(const Tensor4& C) {
-  Tensor4 S;  // summed in pairs, so that the symmetry is exact in floating point
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l)
-          S(pair(i, j), pair(k, l)) = 0.25 * ((C(pair(i, j), pair(k, l)) + C(pair(j, i), pair(l, k))) +
-                                              (C(pair(j, i), pair(k, l)) + C(pair(i, j), pair(l, k))));
-  return S;
-}
-
 Tensor4 isotropic_stiffness(double lambda, double G) {
   Tensor4 C = Tensor4::Zero();
   for (int i = 0; i < 3; ++i)

@@ -30,8 +30,6 @@ Tensor2 first_piola(const Tensor2& stress, const Tensor2& F);
 Tensor2 rotate(const Tensor2& T, const Tensor2& R);
 /// C_ijkl rotated: R_ia R_jb R_kc R_ld C_abcd.
 Tensor4 rotate(const Tensor4& C, const Tensor2& R);
-/// Part of C that is symmetric in both pairs: 1/4 (C_ijkl + C_jikl + C_ijlk + C_jilk).
-Tensor4 minor_symmetric(const Tensor4& C);
 /// Isotropic elasticity: lambda d_ij d_kl + G (d_ik d_jl + d_il d_jk) [Pa].
 Tensor4 isotropic_stiffness(double lambda, double G);
 

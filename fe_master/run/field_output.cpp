@@ -1,7 +1,6 @@
 #include "field_output.hpp"
 
 #include "point_fields.hpp"
-#include "second_gradient_q8.hpp"
 
 namespace femxdem {
 namespace {
@@ -27,25 +26,11 @@ Field element_residual_field(const Problem& problem, const Equilibrium& now) {
   return field;
 }
 
-void add_second_gradient(const SecondGradientQ8& element, FieldStep& fields) {
-  Field v{"micro_gradient", 4, {}}, double_stress{"double_stress", 8, {}};
-  for (std::size_t n = 0; n < element.mesh().nodes.size(); ++n) {
-    const Eigen::Vector4d value = element.micro_gradient(static_cast<int>(n));
-    v.values.insert(v.values.end(), value.data(), value.data() + 4);
-  }
-  for (std::size_t p = 0; p < element.points(); ++p) {
-    const DoubleStress& value = element.double_stress(p);
-    double_stress.values.insert(double_stress.values.end(), value.data(), value.data() + 8);
-  }
-  fields.node_fields.push_back(std::move(v));
-  fields.point_fields.push_back(std::move(double_stress));
-}
-
 }  // namespace
 
-std::vector<Point2> point_positions(const Element& element) {
+std::vector<Point2> point_positions(const Formulation& formulation) {
   std::vector<Point2> X;
-  for (std::size_t p = 0; p < element.points(); ++p) X.push_back(element.shapes(p).X);
+  for (std::size_t p = 0; p < formulation.points(); ++p) X.push_back(formulation.shapes(p).X);
   return X;
 }
 
@@ -63,8 +48,8 @@ FieldStep field_step(int step, double end_time, const Problem& problem, const Eq
   fields.point_fields.push_back(element_residual_field(problem, now));
   const Eigen::Index count = 2 * static_cast<Eigen::Index>(problem.mesh().nodes.size());
   fields.node_fields = {{"displacement", 2, {now.x.data(), now.x.data() + count}}, residual_field(problem, now)};
-  if (const auto* second_gradient = dynamic_cast<const SecondGradientQ8*>(&problem.element()))
-    add_second_gradient(*second_gradient, fields);
+  for (Field& field : problem.formulation().node_fields()) fields.node_fields.push_back(std::move(field));
+  for (Field& field : problem.formulation().point_fields()) fields.point_fields.push_back(std::move(field));
   return fields;
 }
 

@@ -8,7 +8,7 @@
 namespace femxdem {
 
 /// Reference positions of the Gauss points [m], element by element.
-std::vector<Point2> point_positions(const Element& element);
+std::vector<Point2> point_positions(const Formulation& formulation);
 
 /// Fields of a problem's committed state: stress, strain and report of every point, second-order work of the step from
 /// `before`, least tangent eigenvalue and acoustic determinant, residuals, displacements and the formulation's own.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "edge_samples.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -17,14 +19,7 @@ double mean_displacement(const Mesh& mesh, const std::string& edge, const Eigen:
 
 double deformed_length(const Mesh& mesh, const std::string& edge, const Eigen::VectorXd& x) {
   double length = 0;
-  for (const Side& side : mesh.edges.at(edge)) {
-    for (const EdgePoint& g : gauss_edge()) {
-      const Eigen::Vector3d dN = shape_gradient_edge(g.s);
-      Point2 tangent = Point2::Zero();
-      for (int a = 0; a < 3; ++a) tangent += dN[a] * (mesh.nodes[side.nodes[a]] + x.segment<2>(2 * side.nodes[a]));
-      length += g.weight * tangent.norm();
-    }
-  }
+  for (const EdgeSample& g : edge_samples(mesh, edge, x)) length += g.weight * g.tangent.norm();
   return length;
 }
 
@@ -39,25 +34,25 @@ double pressure(const Case& c, const std::string& edge, const Equilibrium& state
   return sum;
 }
 
-double mean_stress(const Element& element, const std::string& region, const Equilibrium& state, int i, int j) {
+double mean_stress(const Formulation& formulation, const std::string& region, const Equilibrium& state, int i, int j) {
   double sum = 0, volume = 0;
   const auto add = [&](std::size_t e) {
     for (std::size_t p = kPointsPerElement * e; p < kPointsPerElement * (e + 1); ++p) {
-      const double weight = element.shapes(p).weight * state.F[p].determinant();
+      const double weight = formulation.shapes(p).weight * state.F[p].determinant();
       sum += weight * state.responses[p].stress(i, j);
       volume += weight;
     }
   };
   if (region.empty()) {
-    for (std::size_t e = 0; e < element.mesh().elements.size(); ++e) add(e);
+    for (std::size_t e = 0; e < formulation.mesh().elements.size(); ++e) add(e);
   } else {
-    for (const int e : element.mesh().regions.at(region)) add(static_cast<std::size_t>(e));
+    for (const int e : formulation.mesh().regions.at(region)) add(static_cast<std::size_t>(e));
   }
   return sum / volume;
 }
 
-double value(const Case& c, const Element& element, const Equilibrium& state, const Monitor& monitor) {
-  const Mesh& mesh = element.mesh();
+double value(const Case& c, const Formulation& formulation, const Equilibrium& state, const Monitor& monitor) {
+  const Mesh& mesh = formulation.mesh();
   switch (monitor.quantity) {
     case Quantity::reaction_x:
       return sum_over_edge(mesh, monitor.edge, state.internal - state.external, 0);
@@ -72,13 +67,13 @@ double value(const Case& c, const Element& element, const Equilibrium& state, co
     case Quantity::pressure:
       return pressure(c, monitor.edge, state);
     case Quantity::stress_xx:
-      return mean_stress(element, monitor.region, state, 0, 0);
+      return mean_stress(formulation, monitor.region, state, 0, 0);
     case Quantity::stress_yy:
-      return mean_stress(element, monitor.region, state, 1, 1);
+      return mean_stress(formulation, monitor.region, state, 1, 1);
     case Quantity::stress_zz:
-      return mean_stress(element, monitor.region, state, 2, 2);
+      return mean_stress(formulation, monitor.region, state, 2, 2);
     case Quantity::stress_xy:
-      return mean_stress(element, monitor.region, state, 0, 1);
+      return mean_stress(formulation, monitor.region, state, 0, 1);
   }
   return 0;
 }
@@ -91,9 +86,9 @@ std::vector<std::string> monitor_names(const Case& c) {
   return names;
 }
 
-std::vector<double> monitor_values(const Case& c, const Element& element, const Equilibrium& state) {
+std::vector<double> monitor_values(const Case& c, const Formulation& formulation, const Equilibrium& state) {
   std::vector<double> values;
-  for (const Monitor& monitor : c.monitors) values.push_back(value(c, element, state, monitor));
+  for (const Monitor& monitor : c.monitors) values.push_back(value(c, formulation, state, monitor));
   return values;
 }
 

@@ -61,7 +61,6 @@ class PathDriver {
 
   const Tensor2& F() const { return F_; }                 ///< committed
   const Response& response() const { return response_; }  ///< committed
-  const LearnedTangent& tangent() const { return *tangent_; }
 
  private:
   bool stress_controlled(int component) const;

@@ -7,8 +7,8 @@ Problem::Problem(const Case& c) : Problem(c, make_mesh(c.mesh, c.regions)) {}
 Problem::Problem(const Case& c, Mesh mesh)
     : case_(c),
       mesh_(std::move(mesh)),
-      element_(make_element(c.element, mesh_)),
-      loads_(*element_, c.control.end_time) {
+      formulation_(make_formulation(c.element, mesh_)),
+      loads_(*formulation_, c.control.end_time) {
   loads_.body_force = c.body_force;
   if (c.control.mode != ControlMode::time) loads_.release(c.control.loads);
   for (const Load& load : c.loads) loads_.add(load);
@@ -30,11 +30,7 @@ Problem::Start Problem::volume_elements() const {
 }
 
 NonlinearSolver& Problem::start(MaterialPoints& points) {
-  solver_.emplace(*element_, points, loads_, with_default_tolerances(case_.solver, on_volume_elements()));
-  if (auto* second_gradient = dynamic_cast<SecondGradientQ8*>(element_.get())) {
-    const Tensor4& C = solver_->committed().responses.front().stiffness;
-    second_gradient->set_penalty(case_.solver.penalty * C(pair(0, 0), pair(0, 0)));
-  }
+  solver_.emplace(*formulation_, points, loads_, with_default_tolerances(case_.solver, on_volume_elements()));
   return *solver_;
 }
 

@@ -8,7 +8,6 @@
 #include "case.hpp"
 #include "loads.hpp"
 #include "nonlinear_solver.hpp"
-#include "second_gradient_q8.hpp"
 
 namespace femxdem {
 
@@ -25,7 +24,7 @@ class Problem {
 
   const Case& parameters() const { return case_; }
   const Mesh& mesh() const { return mesh_; }
-  const Element& element() const { return *element_; }
+  const Formulation& formulation() const { return *formulation_; }
   Loads& loads() { return loads_; }
   const Loads& loads() const { return loads_; }
 
@@ -49,7 +48,7 @@ class Problem {
  private:
   Case case_;
   Mesh mesh_;
-  std::unique_ptr<Element> element_;
+  std::unique_ptr<Formulation> formulation_;
   Loads loads_;
   std::optional<NonlinearSolver> solver_;
 };

@@ -51,8 +51,8 @@ TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& o
       resumed_(std::move(resumed)),
       files_(case_, options),
       solver_(problem.start(points)),
-      control_(case_.control, problem.mesh()),
-      results_(options.folder, problem.mesh(), point_positions(problem.element()), options.existing, resumed_.step),
+      control_(case_.control, problem.formulation()),
+      results_(options.folder, problem.mesh(), point_positions(problem.formulation()), options.existing, resumed_.step),
       size_(
           {case_.control.step, case_.control.min_step, case_.control.max_step, case_.control.growth, case_.control.cut},
           case_.control.end_time) {
@@ -61,7 +61,7 @@ TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& o
 
 int TimeLoop::go() {
   files_.log.say(fmt::format("{}: {} elements, {} material points, {} unknowns, {} rank{}", case_.file,
-                             problem_.mesh().elements.size(), points_.size(), problem_.element().unknowns(),
+                             problem_.mesh().elements.size(), points_.size(), problem_.formulation().unknowns(),
                              options_.ranks, options_.ranks > 1 ? "s" : ""));
   for (const std::string& warning : warnings(case_, problem_.mesh())) files_.log.say("warning: " + warning);
   before_ = solver_.committed();
@@ -149,7 +149,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_.histories = points_.distinct();
   record_.residual = last_.table.back().residual;
   record_.wall_seconds = files_.wall();
-  record_.monitors = monitor_values(case_, problem_.element(), now);
+  record_.monitors = monitor_values(case_, problem_.formulation(), now);
   files_.add(record_);
   files_.log.step(record_, table, done);
   if (last_.best_accepted)
@@ -163,7 +163,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
 }
 
 std::string TimeLoop::place(std::size_t point) const {
-  const Point2& X = problem_.element().shapes(point).X;
+  const Point2& X = problem_.formulation().shapes(point).X;
   return fmt::format("material point {} (element {}, at {:.4g}, {:.4g} m)", point, point / kPointsPerElement, X.x(),
                      X.y());
 }

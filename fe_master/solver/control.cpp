@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "edge_samples.hpp"
 #include "nonlinear_solver.hpp"
 
 namespace femxdem {
@@ -13,85 +14,65 @@ namespace {
 
 constexpr double kLimitSlope = 0.2;  // of the steepest: control passes to the measure below it
 
-Point2 outward_normal(const Point2& tangent) { return {tangent.y(), -tangent.x()}; }  // material on the left
-
-double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
-
 }  // namespace
 
-ControlMeasure::ControlMeasure(const ControlParameters& parameters, const Mesh& mesh)
+ControlMeasure::ControlMeasure(const ControlParameters& parameters, const Formulation& formulation)
     : parameters_(parameters),
-      mesh_(mesh),
-      weights_(Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(mesh.nodes.size()))) {
+      formulation_(formulation),
+      weights_(Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(formulation.mesh().nodes.size()))) {
   if (parameters_.measure == Measure::volume) return;
   add_mean(parameters_.measure_edge, 1);
   if (!parameters_.against_edge.empty()) add_mean(parameters_.against_edge, -1);
 }
 
-/// Adds sign / L int_edge N_a d ds, d the direction that is measured.
+/// Adds sign / A int_edge N_a d dA, d the direction that is measured.
 void ControlMeasure::add_mean(const std::string& edge, double sign) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(weights_.size());
-  double length = 0;
-  for (const Side& side : mesh_.edges.at(edge)) {
-    for (const EdgePoint& g : gauss_edge()) {
-      const Eigen::Vector3d N = shape_edge(g.s), dN = shape_gradient_edge(g.s);
-      Point2 tangent = Point2::Zero();
-      for (int a = 0; a < 3; ++a) tangent += dN[a] * mesh_.nodes[side.nodes[a]];
-      const double ds = g.weight * tangent.norm();
-      Point2 direction = -outward_normal(tangent).normalized();
-      if (parameters_.measure == Measure::displacement_x) direction = Point2::UnitX();
-      if (parameters_.measure == Measure::displacement_y) direction = Point2::UnitY();
-      for (int a = 0; a < 3; ++a) sum.segment<2>(2 * side.nodes[a]) += ds * N[a] * direction;
-      length += ds;
-    }
+  double area = 0;
+  for (const EdgeSample& g : edge_samples(formulation_.mesh(), edge)) {
+    const double dA = g.weight * g.tangent.norm() * formulation_.thickness(g.position);
+    Point2 direction = -outward_normal(g.tangent).normalized();
+    if (parameters_.measure == Measure::displacement_x) direction = Point2::UnitX();
+    if (parameters_.measure == Measure::displacement_y) direction = Point2::UnitY();
+    for (int a = 0; a < 3; ++a) sum.segment<2>(2 * g.nodes[a]) += dA * g.N[a] * direction;
+    area += dA;
   }
-  weights_ += sign / length * sum;
+  weights_ += sign / area * sum;
 }
 
-/// -1/2 int x cross dx along the edge, which has the material on its left, and its derivative.
-double ControlMeasure::swept_area(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) const {
-  double area = 0;
-  for (const Side& side : mesh_.edges.at(parameters_.measure_edge)) {
-    for (const EdgePoint& g : gauss_edge()) {
-      const Eigen::Vector3d N = shape_edge(g.s), dN = shape_gradient_edge(g.s);
-      Point2 position = Point2::Zero(), tangent = Point2::Zero();
-      for (int a = 0; a < 3; ++a) {
-        const Point2 node = mesh_.nodes[side.nodes[a]] + Point2(x.segment<2>(2 * side.nodes[a]));
-        position += N[a] * node;
-        tangent += dN[a] * node;
-      }
-      area -= 0.5 * g.weight * cross(position, tangent);
-      if (gradient == nullptr) continue;
-      for (int a = 0; a < 3; ++a) {
-        // d(position cross tangent) = N_a (du cross tangent) + dN_a (position cross du)
-        gradient->segment<2>(2 * side.nodes[a]) -=
-            0.5 * g.weight * (N[a] * outward_normal(tangent) - dN[a] * outward_normal(position));
-      }
-    }
+/// Volume on the outer side of the edge at the unknowns x, and its derivative where it is asked for.
+double ControlMeasure::swept_volume(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) const {
+  double volume = 0;
+  for (const EdgeSample& g : edge_samples(formulation_.mesh(), parameters_.measure_edge, x)) {
+    const SweptVolume swept = formulation_.swept_volume(g.position, g.tangent);
+    volume += g.weight * swept.value;
+    if (gradient == nullptr) continue;
+    for (int a = 0; a < 3; ++a)
+      gradient->segment<2>(2 * g.nodes[a]) += g.weight * (g.N[a] * swept.by_position + g.dN[a] * swept.by_tangent);
   }
-  return area;
+  return volume;
 }
 
 double ControlMeasure::value(const Eigen::VectorXd& x) const {
   if (parameters_.measure != Measure::volume) return weights_.dot(x.head(weights_.size()));
-  return swept_area(x, nullptr) - swept_area(Eigen::VectorXd::Zero(x.size()), nullptr);
+  return swept_volume(x, nullptr) - swept_volume(Eigen::VectorXd::Zero(x.size()), nullptr);
 }
 
 Eigen::VectorXd ControlMeasure::gradient(const Eigen::VectorXd& x) const {
   Eigen::VectorXd c = Eigen::VectorXd::Zero(x.size());
   if (parameters_.measure == Measure::volume) {
-    swept_area(x, &c);
+    swept_volume(x, &c);
   } else {
     c.head(weights_.size()) = weights_;
   }
   return c;
 }
 
-StepControl::StepControl(const ControlParameters& parameters, const Mesh& mesh)
+StepControl::StepControl(const ControlParameters& parameters, const Formulation& formulation)
     : parameters_(parameters),
       by_measure_(parameters.mode == ControlMode::measure),
       rate_(by_measure_ ? parameters.rate : 0) {
-  if (parameters.mode != ControlMode::time) measure_.emplace(parameters, mesh);
+  if (parameters.mode != ControlMode::time) measure_.emplace(parameters, formulation);
 }
 
 std::optional<MeasureTarget> StepControl::target(const Equilibrium& committed, double dt) const {
@@ -120,7 +101,7 @@ std::string StepControl::description() const {
   constexpr std::array<const char*, 4> kNames = {"mean displacement in x", "mean displacement in y", "opening",
                                                  "volume"};
   return fmt::format("{} of edge '{}' at {:.3g} {}/s", kNames.at(static_cast<std::size_t>(parameters_.measure)),
-                     parameters_.measure_edge, rate_, parameters_.measure == Measure::volume ? "m2" : "m");
+                     parameters_.measure_edge, rate_, measure_->unit());
 }
 
 void StepControl::save(NamedArrays& arrays) const {

@@ -4,34 +4,36 @@
 #include <string>
 
 #include "control_parameters.hpp"
-#include "element.hpp"
+#include "formulation.hpp"
 
 namespace femxdem {
 
 struct Equilibrium;
 
 /// A scalar measure m of the displacements of an edge that can be prescribed in place of the factor of loads:
-///   displacement_x, displacement_y: mean over the edge [m];
+///   displacement_x, displacement_y: mean over the edge (per area that the formulation gives it) [m];
 ///   opening: mean displacement against the outward normal of the undeformed edge, a cavity that widens is positive
-///   [m]; volume: growth of the area on the edge's outer side, swept about the origin, per unit thickness [m^2]; exact
-///   for
-///           an arc whose ends move on rays through the origin.
+///   [m];
+///   volume: growth of the volume on the edge's outer side (Formulation::swept_volume), in plane strain swept about the
+///   origin and per thickness [m^2], exact for an arc whose ends move on rays through the origin; axisymmetric [m^3].
 /// With against_edge, the same mean of that edge is subtracted (indirect control across a band).
 class ControlMeasure {
  public:
-  /// mesh is kept by reference.
-  ControlMeasure(const ControlParameters& parameters, const Mesh& mesh);
+  /// formulation is kept by reference.
+  ControlMeasure(const ControlParameters& parameters, const Formulation& formulation);
 
   double value(const Eigen::VectorXd& x) const;
+  /// Of the value.
+  const char* unit() const { return parameters_.measure == Measure::volume ? formulation_.volume_unit() : "m"; }
   /// dm/dx, of the size of x.
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;
 
  private:
   void add_mean(const std::string& edge, double sign);
-  double swept_area(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) const;
+  double swept_volume(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) const;
 
   ControlParameters parameters_;
-  const Mesh& mesh_;
+  const Formulation& formulation_;
   Eigen::VectorXd weights_;  // of the nodal displacements in a linear measure
 };
 
@@ -46,7 +48,7 @@ struct MeasureTarget {
 /// Automatic control starts by time and passes to the measure near a limit point, at the rate that it then has.
 class StepControl {
  public:
-  StepControl(const ControlParameters& parameters, const Mesh& mesh);
+  StepControl(const ControlParameters& parameters, const Formulation& formulation);
 
   /// Target of a step of dt from the committed state; none under control by time.
   std::optional<MeasureTarget> target(const Equilibrium& committed, double dt) const;
@@ -67,7 +69,7 @@ class StepControl {
   ControlParameters parameters_;
   std::optional<ControlMeasure> measure_;  // where the case names one
   bool by_measure_;
-  double rate_;          // of the measure in the last step [m/s, m^2/s]
+  double rate_;          // of the measure in the last step [m/s, m^2/s, m^3/s]
   double steepest_ = 0;  // largest rise of the load factor over that of the measure
 };
 

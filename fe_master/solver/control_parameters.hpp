@@ -22,7 +22,7 @@ struct ControlParameters {
   Measure measure = Measure::opening;  ///< what is prescribed in its place (ControlMeasure)
   std::string measure_edge;
   std::string against_edge;  ///< whose measure is subtracted, or empty
-  double rate = kNotGiven;   ///< of the measure [m/s, m^2/s]
+  double rate = kNotGiven;   ///< of the measure [m/s, m^2/s, m^3/s]
 };
 
 }  // namespace femxdem

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <array>
 #include <vector>
 
-#include "element.hpp"
+#include "strain_components.hpp"
 #include "tensor.hpp"
 
 namespace femxdem {
@@ -17,11 +16,6 @@ Tensor4 piola_elastic(const Tensor4& C, const Tensor2& F);
 /// dP/dF of a law sigma = R s(U) R^T, F = R U, with ds = C : sym(dU U_n^-1): exact, unsymmetric in general [Pa].
 /// U_n: right stretch at the start of the step, from which C counts strain.
 Tensor4 piola_corotational(const Tensor4& C, const Tensor2& stress, const Tensor2& F, const Tensor2& U_n);
-
-/// Components of strain that a formulation can produce, in Mandel form: index 0 to 5 is 11, 22, 33, 23, 13, 12.
-using StrainComponents = std::vector<int>;
-/// Plane strain: 11, 22, 12.
-inline const StrainComponents kPlaneStrain = {0, 1, 5};
 
 using MandelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 using MandelVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;

@@ -8,7 +8,6 @@
 #include <limits>
 #include <random>
 
-#include "convergence.hpp"
 #include "errors.hpp"
 
 namespace femxdem {
@@ -26,17 +25,32 @@ std::vector<Tensor2> stresses(const std::vector<Response>& responses) {
   return values;
 }
 
+void add(NamedArrays& arrays, const std::string& name, const Eigen::VectorXd& values) {
+  arrays.emplace_back(name, std::vector<double>(values.begin(), values.end()));
+}
+
+Eigen::VectorXd find_vector(const NamedArrays& arrays, const std::string& name) {
+  const std::vector<double>& values = find_array(arrays, name);
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
 int largest(const std::vector<double>& values) {
   return static_cast<int>(std::max_element(values.begin(), values.end()) - values.begin());
 }
 
-std::vector<Response> undeformed(MaterialPoints& points, std::span<const Tensor2> F) {
+/// The state at time 0 but for its forces: no displacements, and what the points answer to them.
+Equilibrium undeformed(const Formulation& formulation, MaterialPoints& points, const Loads& loads) {
+  Equilibrium state;
+  state.x = Eigen::VectorXd::Zero(formulation.unknowns());
+  state.multipliers = Eigen::VectorXd::Zero(formulation.multipliers());
+  state.load_factor = loads.released_factor(0);
+  state.F = formulation.deformation(state.x);
   points.begin_step();
-  std::vector<Response> responses = points.evaluate(F, Operator::elastic);
-  for (const Response& r : responses) {
+  state.responses = points.evaluate(state.F, Operator::elastic);
+  for (const Response& r : state.responses) {
     if (r.failure) throw UserError(r.failure->sentence + " " + r.failure->advice);
   }
-  return responses;
+  return state;
 }
 
 /// What else a step asks for whose force residual was met.
@@ -51,22 +65,21 @@ std::string unmet(const StepResult& result) {
 
 }  // namespace
 
-NonlinearSolver::NonlinearSolver(Element& element, MaterialPoints& points, const Loads& loads,
+NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& points, const Loads& loads,
                                  const SolverParameters& parameters)
-    : element_(element),
+    : formulation_(formulation),
       points_(points),
       loads_(loads),
       parameters_(parameters),
       prescribed_(loads.prescribed_dofs()),
-      assembler_(element, prescribed_),
-      committed_{
-          0, Eigen::VectorXd::Zero(element.unknowns()), element.multipliers(), loads.released_factor(0), {}, {}, {},
-          {}},
-      last_external_change_(Eigen::VectorXd::Zero(element.unknowns())),
-      operators_(parameters,
-                 committed_.responses = undeformed(points, committed_.F = element.deformation(committed_.x))) {
+      assembler_(formulation, prescribed_),
+      committed_(undeformed(formulation, points, loads)),
+      last_{0, Eigen::VectorXd::Zero(formulation.unknowns()), Eigen::VectorXd::Zero(formulation.multipliers()),
+            Eigen::VectorXd::Zero(formulation.unknowns()), 0},
+      operators_(parameters, committed_.responses, formulation.strain_components()),
+      penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
   femxdem::commit(points_, committed_.responses);
-  committed_.internal = assembler_.force(committed_.x, committed_.F, stresses(committed_.responses));
+  committed_.internal = assembler_.force(committed_.configuration(), stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
 }
 
@@ -109,17 +122,11 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
     search.start(now.residual);
     move(trial, z + change);
   }
-  if (accept_best(best, result)) {
-    commit(best, dt);
-  } else if (result.reason.empty() && !result.failure) {
-    result.reason = history.verdict();
-    if (history.least() <= parameters_.tolerance) result.reason += unmet(result);
-  }
+  give_up(best, dt, history, result);
   return result;
 }
 
 void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
-  element_.begin_step(trial.x);
   points_.begin_step();
   operators_.begin_step(committed_.F, committed_.responses);
   factorised_in_step_ = false;
@@ -132,23 +139,23 @@ void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
 /// Start of the iterations: the last step's increment extrapolated, corrected for the carried residual, the change of
 /// the loads and the prescribed values; an elastic predictor where there is no last increment.
 void NonlinearSolver::predict(Equilibrium& trial, double dt) {
-  const double factor = parameters_.predictor == Predictor::extrapolate && last_dt_ > 0 ? dt / last_dt_ : 0;
-  element_.extrapolate(trial.x, factor);
+  const double factor = parameters_.predictor == Predictor::extrapolate && last_.dt > 0 ? dt / last_.dt : 0;
+  trial.x += factor * last_.x;
+  trial.multipliers += factor * last_.multipliers;
   const Eigen::VectorXd target = loads_.prescribed(committed_.time, trial.time);
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(element_.unknowns());
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (std::size_t i = 0; i < prescribed_.size(); ++i) {
     change[prescribed_[i]] = target[static_cast<Eigen::Index>(i)] - trial.x[prescribed_[i]];
   }
   trial.load_factor =
-      target_ ? committed_.load_factor + factor * last_factor_change_ : loads_.released_factor(trial.time);
+      target_ ? committed_.load_factor + factor * last_.load_factor : loads_.released_factor(trial.time);
   const Eigen::VectorXd external = loads_.external_force(trial.x, trial.time, trial.load_factor);
-  const Eigen::VectorXd residual = external - factor * last_external_change_ - committed_.internal;
+  const Eigen::VectorXd residual = external - factor * last_.external - committed_.internal;
   if (const auto c = correction(committed_, trial.x, residual, change)) {
     trial.x += c->x;
     trial.load_factor += c->load_factor;
-    element_.update_multipliers(trial.x);
+    trial.multipliers = formulation_.updated_multipliers(trial.multipliers, trial.x, penalty_);
   }
-  trial.multipliers = element_.multipliers();
   for (std::size_t i = 0; i < prescribed_.size(); ++i) {
     trial.x[prescribed_[i]] = target[static_cast<Eigen::Index>(i)];
   }
@@ -158,7 +165,7 @@ void NonlinearSolver::predict(Equilibrium& trial, double dt) {
 /// predicted change away from it, in a random direction given by the seed, so that other solutions of the step can be
 /// found. Uniform numbers straight from the generator: equal on all platforms.
 void NonlinearSolver::start_at_random(Equilibrium& trial) const {
-  const int displacements = 2 * static_cast<int>(element_.mesh().nodes.size());
+  const int displacements = 2 * static_cast<int>(formulation_.mesh().nodes.size());
   std::mt19937 generator(static_cast<unsigned>(parameters_.start_seed));
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(displacements);
   for (const int i : assembler_.free()) {
@@ -172,7 +179,7 @@ void NonlinearSolver::start_at_random(Equilibrium& trial) const {
 bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
   Iteration& now = result.table.back();
   const auto start = std::chrono::steady_clock::now();
-  trial.F = element_.deformation(trial.x);
+  trial.F = formulation_.deformation(trial.x);
   trial.responses = points_.evaluate(trial.F, operators_.wanted());
   ++result.evaluations;
   for (const Response& r : trial.responses) {
@@ -190,7 +197,7 @@ bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
     result.evaluations += probes + 1;
     trial.responses = points_.evaluate(trial.F, operators_.wanted());  // the trial to be committed is the last one
   }
-  trial.internal = assembler_.force(trial.x, trial.F, stresses(trial.responses));
+  trial.internal = assembler_.force(trial.configuration(), stresses(trial.responses));
   trial.external = loads_.external_force(trial.x, trial.time, trial.load_factor);
   now.evaluate_seconds = seconds_since(start);
   return true;
@@ -202,11 +209,11 @@ std::optional<NonlinearSolver::Correction> NonlinearSolver::correction(const Equ
                                                                        const Eigen::VectorXd& residual,
                                                                        const Eigen::VectorXd& change) {
   const std::vector<int>& free = assembler_.free();
-  const Eigen::VectorXd balance = residual - assembler_.constraint_force(x);
+  const Eigen::VectorXd balance = residual - assembler_.constraint_force(x, penalty_);
   Eigen::VectorXd rhs = balance(free);
   if (!factorised_in_step_ || !operators_.constant_in_step()) {
     const auto dPdF = operators_.piola(at.F, at.responses);
-    const SparseMatrix& K = assembler_.matrix(at.x, at.F, dPdF, !operators_.symmetric(), change, rhs);
+    const SparseMatrix& K = assembler_.matrix({at.x, at.F, dPdF, !operators_.symmetric(), penalty_}, change, rhs);
     if (!linear_solver_.factorise(K, operators_.symmetric())) return std::nullopt;
     factorised_in_step_ = true;
   }
@@ -231,7 +238,7 @@ bool NonlinearSolver::add_load_factor(const Eigen::VectorXd& x, Correction& c) c
 
 /// How far the constraints are from being met.
 double NonlinearSolver::gap(const Equilibrium& trial) const {
-  const double of_element = element_.constraint_gap(trial.x);
+  const double of_element = formulation_.constraint_gap(trial.x);
   if (!target_) return of_element;
   const double missing = target_->value - target_->measure->value(trial.x);
   return std::max(of_element, std::abs(missing / (target_->value - target_->measure->value(committed_.x))));
@@ -240,24 +247,22 @@ double NonlinearSolver::gap(const Equilibrium& trial) const {
 /// The change of the unknowns that the operator asks for at a trial; its size goes to the iteration.
 std::optional<Eigen::VectorXd> NonlinearSolver::correct(const Equilibrium& trial, Iteration& now) {
   const auto start = std::chrono::steady_clock::now();
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(element_.unknowns());
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(formulation_.unknowns());
   const auto c = correction(trial, trial.x, trial.external - trial.internal, none);
   now.solve_seconds = seconds_since(start);
   now.gap = gap(trial);
   if (!c) return std::nullopt;
-  const int displacements = 2 * static_cast<int>(element_.mesh().nodes.size());
+  const int displacements = 2 * static_cast<int>(formulation_.mesh().nodes.size());
   const double moved = (trial.x - committed_.x).head(displacements).norm();
   now.correction = moved > 0 ? c->x.head(displacements).norm() / moved : 0;
   Equilibrium corrected;
   corrected.x = trial.x + c->x;
   corrected.load_factor = trial.load_factor + c->load_factor;
-  element_.update_multipliers(corrected.x);
-  corrected.multipliers = element_.multipliers();
-  element_.set_multipliers(trial.multipliers);
+  corrected.multipliers = formulation_.updated_multipliers(trial.multipliers, corrected.x, penalty_);
   return unknowns(corrected) - unknowns(trial);
 }
 
-/// All that an iteration changes in one vector: unknowns and multipliers of the element, factor of the released loads.
+/// All that an iteration changes in one vector: unknowns and multipliers, factor of the released loads.
 Eigen::VectorXd NonlinearSolver::unknowns(const Equilibrium& trial) const {
   Eigen::VectorXd z(trial.x.size() + trial.multipliers.size() + 1);
   z << trial.x, trial.multipliers, trial.load_factor;
@@ -268,13 +273,12 @@ void NonlinearSolver::move(Equilibrium& trial, const Eigen::VectorXd& z) {
   trial.x = z.head(trial.x.size());
   trial.multipliers = z.segment(trial.x.size(), trial.multipliers.size());
   trial.load_factor = z[z.size() - 1];
-  element_.set_multipliers(trial.multipliers);
 }
 
 /// Anderson's least squares see displacements and micro gradients times the element size; multipliers follow.
 AndersonAcceleration NonlinearSolver::acceleration() const {
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(unknowns(committed_).size());
-  for (const int i : assembler_.free()) weights[i] = element_.residual_length(i);
+  for (const int i : assembler_.free()) weights[i] = formulation_.residual_length(i);
   const int depth = parameters_.acceleration == Acceleration::anderson ? parameters_.anderson_depth : 0;
   return {depth, parameters_.anderson_truncation, std::move(weights)};
 }
@@ -283,7 +287,7 @@ AndersonAcceleration NonlinearSolver::acceleration() const {
 /// prescribed.
 Eigen::VectorXd NonlinearSolver::scaled_residual(const Equilibrium& state) const {
   Eigen::VectorXd residual = state.external - state.internal;
-  for (Eigen::Index i = 0; i < residual.size(); ++i) residual[i] /= element_.residual_length(static_cast<int>(i));
+  for (Eigen::Index i = 0; i < residual.size(); ++i) residual[i] /= formulation_.residual_length(static_cast<int>(i));
   double reactions = 0;
   for (const int i : prescribed_) {
     reactions += residual[i] * residual[i];
@@ -302,8 +306,8 @@ std::vector<double> NonlinearSolver::element_residuals(const Equilibrium& state)
 /// Norms of a residual over the unknowns of each element.
 std::vector<double> NonlinearSolver::of_elements(const Eigen::VectorXd& residual) const {
   std::vector<double> norms;
-  for (std::size_t e = 0; e < element_.mesh().elements.size(); ++e)
-    norms.push_back(residual(element_.dofs(static_cast<int>(e))).norm());
+  for (std::size_t e = 0; e < formulation_.mesh().elements.size(); ++e)
+    norms.push_back(residual(formulation_.dofs(static_cast<int>(e))).norm());
   return norms;
 }
 
@@ -319,7 +323,6 @@ bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
   const double residual = relative_residual(best);
   if (residual > parameters_.accept_best_factor * parameters_.tolerance) return false;
   Iteration& now = result.table.emplace_back();
-  element_.set_multipliers(best.multipliers);
   if (!evaluate(best, result)) return false;
   now.residual = relative_residual(best);
   now.gap = gap(best);
@@ -329,25 +332,34 @@ bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
   return true;
 }
 
+/// The end of a step whose iterations have not converged: its best iterate, or the reason why not.
+void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistory& history, StepResult& result) {
+  if (accept_best(best, result)) {
+    commit(best, dt);
+  } else if (result.reason.empty() && !result.failure) {
+    result.reason = history.verdict();
+    if (history.least() <= parameters_.tolerance) result.reason += unmet(result);
+  }
+}
+
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   femxdem::commit(points_, trial.responses);
-  element_.commit(trial.x);
-  last_external_change_ = trial.external - committed_.external;
-  last_dt_ = dt;
-  last_factor_change_ = trial.load_factor - committed_.load_factor;
+  last_ = {dt, trial.x - committed_.x, trial.multipliers - committed_.multipliers, trial.external - committed_.external,
+           trial.load_factor - committed_.load_factor};
   committed_ = std::move(trial);
-  element_.begin_step(committed_.x);
+  formulation_.commit(committed_.x);
 }
 
 void NonlinearSolver::save(NamedArrays& arrays) const {
-  element_.save(arrays);
+  formulation_.save(arrays);
   operators_.save(arrays);
   arrays.emplace_back("solver.time",
-                      std::vector<double>{committed_.time, last_dt_, committed_.load_factor, last_factor_change_});
-  const auto& change = last_external_change_;
-  arrays.emplace_back("solver.last_external_change", std::vector<double>(change.data(), change.data() + change.size()));
-  const auto& internal = committed_.internal;
-  arrays.emplace_back("solver.internal", std::vector<double>(internal.data(), internal.data() + internal.size()));
+                      std::vector<double>{committed_.time, last_.dt, committed_.load_factor, last_.load_factor});
+  add(arrays, "solver.multipliers", committed_.multipliers);
+  add(arrays, "solver.last_change", last_.x);
+  add(arrays, "solver.last_multiplier_change", last_.multipliers);
+  add(arrays, "solver.last_external_change", last_.external);
+  add(arrays, "solver.internal", committed_.internal);
   std::vector<double> answers;
   for (const Response& r : committed_.responses) {
     answers.insert(answers.end(), r.stress.data(), r.stress.data() + 9);
@@ -358,17 +370,16 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
 }
 
 void NonlinearSolver::load(const NamedArrays& arrays) {
-  element_.load(arrays);
+  formulation_.load(arrays);
   operators_.load(arrays);
-  committed_.time = find_array(arrays, "solver.time").at(0);
-  last_dt_ = find_array(arrays, "solver.time").at(1);
-  committed_.load_factor = find_array(arrays, "solver.time").at(2);
-  last_factor_change_ = find_array(arrays, "solver.time").at(3);
-  const auto& change = find_array(arrays, "solver.last_external_change");
-  last_external_change_ = Eigen::Map<const Eigen::VectorXd>(change.data(), static_cast<Eigen::Index>(change.size()));
-  element_.begin_step(committed_.x);
-  committed_.multipliers = element_.multipliers();
-  committed_.F = element_.deformation(committed_.x);
+  const auto& time = find_array(arrays, "solver.time");
+  committed_.time = time.at(0);
+  committed_.load_factor = time.at(2);
+  committed_.x = formulation_.start();
+  committed_.multipliers = find_vector(arrays, "solver.multipliers");
+  last_ = {time.at(1), find_vector(arrays, "solver.last_change"), find_vector(arrays, "solver.last_multiplier_change"),
+           find_vector(arrays, "solver.last_external_change"), time.at(3)};
+  committed_.F = formulation_.deformation(committed_.x);
   const double* value = find_array(arrays, "solver.responses").data();
   for (Response& r : committed_.responses) {
     std::copy_n(value, 9, r.stress.data());
@@ -376,8 +387,7 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
     std::copy_n(value + 90, r.report.values.size(), r.report.values.begin());
     value += 90 + r.report.values.size();
   }
-  const auto& internal = find_array(arrays, "solver.internal");
-  committed_.internal = Eigen::Map<const Eigen::VectorXd>(internal.data(), static_cast<Eigen::Index>(internal.size()));
+  committed_.internal = find_vector(arrays, "solver.internal");
   committed_.external = loads_.external_force(committed_.x, committed_.time, committed_.load_factor);
 }
 

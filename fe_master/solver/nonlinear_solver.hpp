@@ -7,7 +7,8 @@
 #include "acceleration.hpp"
 #include "assembler.hpp"
 #include "control.hpp"
-#include "element.hpp"
+#include "convergence.hpp"
+#include "formulation.hpp"
 #include "linear_solver.hpp"
 #include "loads.hpp"
 #include "material_points.hpp"
@@ -45,12 +46,15 @@ struct StepResult {
 /// A state in equilibrium.
 struct Equilibrium {
   double time = 0;              ///< [s]
-  Eigen::VectorXd x;            ///< unknowns (Element)
-  Eigen::VectorXd multipliers;  ///< of the constraints (Element)
+  Eigen::VectorXd x;            ///< unknowns (Formulation)
+  Eigen::VectorXd multipliers;  ///< of the constraints (Formulation) [Pa]
   double load_factor = 0;       ///< of the released loads (Loads::release) [-]
   std::vector<Tensor2> F;
   std::vector<Response> responses;
-  Eigen::VectorXd internal, external;  ///< nodal forces of all unknowns [N/m]; their difference is the reaction
+  Eigen::VectorXd internal,
+      external;  ///< nodal forces of all unknowns [N per thickness, N]; their difference: reaction
+
+  Configuration configuration() const { return {x, multipliers, F}; }
 };
 
 /// Equilibrium of the finite elements with their material points, step by step.
@@ -59,8 +63,10 @@ struct Equilibrium {
 /// no trace, and the trial that satisfied equilibrium is the state that is committed.
 class NonlinearSolver {
  public:
-  /// Evaluates the undeformed state. Throws UserError when a point cannot answer it.
-  NonlinearSolver(Element& element, MaterialPoints& points, const Loads& loads, const SolverParameters& parameters);
+  /// Evaluates the undeformed state, whose stiffness C_1111 (of the first point) gives the penalty of the constraints
+  /// its unit. Throws UserError when a point cannot answer it.
+  NonlinearSolver(Formulation& formulation, MaterialPoints& points, const Loads& loads,
+                  const SolverParameters& parameters);
 
   /// Solves the step from the committed state to time t_n + dt and commits it if it converges. With a target, the
   /// factor of the released loads is an unknown and the measure's value the equation for it.
@@ -96,11 +102,12 @@ class NonlinearSolver {
   AndersonAcceleration acceleration() const;
   bool converged(const Iteration& iteration) const;
   bool accept_best(Equilibrium& best, StepResult& result);
+  void give_up(Equilibrium& best, double dt, const ResidualHistory& history, StepResult& result);
   void commit(Equilibrium& trial, double dt);
   Eigen::VectorXd scaled_residual(const Equilibrium& state) const;
   std::vector<double> of_elements(const Eigen::VectorXd& residual) const;
 
-  Element& element_;
+  Formulation& formulation_;
   MaterialPoints& points_;
   const Loads& loads_;
   SolverParameters parameters_;
@@ -109,11 +116,15 @@ class NonlinearSolver {
   LinearSolver linear_solver_;
   bool factorised_in_step_ = false;
   Equilibrium committed_;
-  Eigen::VectorXd last_external_change_;  // of the last committed step
-  double last_dt_ = 0;
-  double last_factor_change_ = 0;
+  struct Increment {  // of the last committed step
+    double dt = 0;
+    Eigen::VectorXd x, multipliers, external;
+    double load_factor = 0;
+  };
+  Increment last_;
   std::optional<MeasureTarget> target_;  // of the step under way
   PointOperators operators_;
+  double penalty_;  // r of the augmented Lagrangian [Pa]
 };
 
 /// The tolerances of a case, or the defaults where it gives none: 5e-3 (force) and 0.1 (displacement) for volume

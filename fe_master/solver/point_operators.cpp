@@ -16,14 +16,17 @@ bool all_answered(std::span<const Response> responses) {
 
 }  // namespace
 
-PointOperators::PointOperators(const SolverParameters& parameters, std::span<const Response> reference)
-    : parameters_(parameters), F_n_(reference.size(), Tensor2::Identity()) {
+PointOperators::PointOperators(const SolverParameters& parameters, std::span<const Response> reference,
+                               const StrainComponents& components)
+    : parameters_(parameters),
+      components_(static_cast<int>(components.size())),
+      F_n_(reference.size(), Tensor2::Identity()) {
   const double first = is_given(parameters.qn_first) ? parameters.qn_first : 1;
   const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, first, parameters.qn_noise};
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
     elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));
-    learned_.emplace_back(r.stiffness, kPlaneStrain, limits);
+    learned_.emplace_back(r.stiffness, components, limits);
   }
 }
 
@@ -62,8 +65,7 @@ int PointOperators::probe(MaterialPoints& points, std::span<const Tensor2> F, st
     const double step = (F[p] - F_n_[p]).norm();
     probes.push_back(learned_[p].start_probe(F[p], responses[p].stress, std::max(kProbe * step, kLeastProbe)));
   }
-  const int count = static_cast<int>(kPlaneStrain.size());
-  for (int component = 0; component < count; ++component) {
+  for (int component = 0; component < components_; ++component) {
     std::vector<Tensor2> probed;
     for (std::size_t p = 0; p < F.size(); ++p) probed.push_back(learned_[p].probe(probes[p], F[p], component));
     const std::vector<Response> answers = points.evaluate(probed, Operator::none);
@@ -71,7 +73,7 @@ int PointOperators::probe(MaterialPoints& points, std::span<const Tensor2> F, st
     for (std::size_t p = 0; p < F.size(); ++p) learned_[p].record(probes[p], probed[p], answers[p].stress, component);
   }
   for (std::size_t p = 0; p < F.size(); ++p) learned_[p].finish_probe(probes[p]);
-  return count;
+  return components_;
 }
 
 std::vector<Tensor4> PointOperators::piola(std::span<const Tensor2> F, std::span<const Response> responses) const {

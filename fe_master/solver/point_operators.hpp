@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "element.hpp"
 #include "learned_tangent.hpp"
 #include "material_points.hpp"
+#include "named_arrays.hpp"
 #include "solver_parameters.hpp"
 
 namespace femxdem {
@@ -17,8 +17,10 @@ namespace femxdem {
 ///   quasi_newton:  each point's own tangent, learned from the responses that it has given (LearnedTangent)
 class PointOperators {
  public:
-  /// reference: responses of all points in the undeformed state, with their elastic stiffness.
-  PointOperators(const SolverParameters& parameters, std::span<const Response> reference);
+  /// reference: responses of all points in the undeformed state, with their elastic stiffness; components: of the
+  /// strain that the formulation can produce, which are what a point's own tangent learns.
+  PointOperators(const SolverParameters& parameters, std::span<const Response> reference,
+                 const StrainComponents& components);
 
   /// Stiffness to be asked for in every evaluation.
   Operator wanted() const;
@@ -49,6 +51,7 @@ class PointOperators {
 
  private:
   SolverParameters parameters_;
+  int components_;                                     // of strain
   std::vector<Tensor4> elastic_;                       // in use by the elastic operator
   std::vector<double> elastic_acoustic_determinants_;  // undeformed [Pa^2]
   std::vector<LearnedTangent> learned_;                // quasi_newton and perturbation

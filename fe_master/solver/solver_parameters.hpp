@@ -30,7 +30,7 @@ struct SolverParameters {
   double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;       ///< of the step that goes beyond this time [s]
   int start_seed = 1;
-  double penalty = 1e4;  ///< augmented Lagrangian: r / Young-like modulus of the element [-]
+  double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
 };
 
 }  // namespace femxdem

@@ -26,9 +26,11 @@ inline std::set<int> boundary_nodes(const Mesh& mesh) {
   return nodes;
 }
 
-/// Unknowns of small-strain elasticity about F = I for prescribed unknowns and nodal forces of all unknowns [N/m].
-inline Eigen::VectorXd solve_linear(const Element& element, const Tensor4& C, const std::map<int, double>& prescribed,
-                                    const Eigen::VectorXd& force) {
+/// Unknowns of small-strain elasticity about F = I for prescribed unknowns and nodal forces of all unknowns [N/m];
+/// penalty of the constraints [Pa].
+inline Eigen::VectorXd solve_linear(const Formulation& element, const Tensor4& C,
+                                    const std::map<int, double>& prescribed, const Eigen::VectorXd& force,
+                                    double penalty = 0) {
   std::vector<int> fixed;
   Eigen::VectorXd x = Eigen::VectorXd::Zero(element.unknowns());
   for (const auto& [dof, value] : prescribed) {
@@ -40,7 +42,7 @@ inline Eigen::VectorXd solve_linear(const Element& element, const Tensor4& C, co
   const Eigen::VectorXd reference = Eigen::VectorXd::Zero(element.unknowns());
   const std::vector<Tensor2> F(element.points(), Tensor2::Identity());
   const std::vector<Tensor4> dPdF(element.points(), C);
-  const SparseMatrix& K = assembler.matrix(reference, F, dPdF, true, x, rhs);
+  const SparseMatrix& K = assembler.matrix({reference, F, dPdF, true, penalty}, x, rhs);
   LinearSolver solver;
   if (!solver.factorise(K, true)) throw std::runtime_error("singular matrix");
   x(assembler.free()) = solver.solve(rhs);

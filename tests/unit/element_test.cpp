@@ -1,5 +1,3 @@
-#include "element.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "errors.hpp"
 #include "learned_tangent.hpp"
 #include "loads.hpp"
+#include "plane_strain_q8.hpp"
 
 namespace femxdem {
 namespace {
@@ -34,12 +33,12 @@ double largest_error(const Mesh& mesh, const Eigen::VectorXd& x, const std::func
 }
 
 /// Matrix of all unknowns about the reference configuration.
-Eigen::MatrixXd free_matrix(const Element& element) {
+Eigen::MatrixXd free_matrix(const Formulation& element) {
   Assembler assembler(element, {});
   Eigen::VectorXd rhs = Eigen::VectorXd::Zero(element.unknowns());
   const std::vector<Tensor2> F(element.points(), Tensor2::Identity());
   const std::vector<Tensor4> dPdF(element.points(), kC);
-  return assembler.matrix(rhs, F, dPdF, true, rhs, rhs);
+  return assembler.matrix({rhs, F, dPdF, true, 0}, rhs, rhs);
 }
 
 int zero_modes(const Eigen::MatrixXd& K) {
@@ -72,7 +71,7 @@ TEST(Q8, PatchTestIsExactOnAnyMesh) {
   const Eigen::Matrix2d A = (Eigen::Matrix2d() << 1e-3, 2e-3, -3e-3, 4e-3).finished();
   const auto u = [&](const Point2& X) -> Point2 { return A * X; };
   for (const Mesh& mesh : square_meshes()) {
-    const Element element(mesh);
+    const PlaneStrainQ8 element(mesh);
     const Eigen::VectorXd x =
         solve_linear(element, kC, prescribe_on_boundary(mesh, u), Eigen::VectorXd::Zero(element.unknowns()));
     EXPECT_LT(largest_error(mesh, x, u), 1e-12);
@@ -91,7 +90,7 @@ TEST(Q8, PureBendingIsExactOnAffineElements) {
   };
   const auto meshes = square_meshes();
   for (int m = 0; m < 2; ++m) {
-    const Element element(meshes[m]);
+    const PlaneStrainQ8 element(meshes[m]);
     const Eigen::VectorXd x =
         solve_linear(element, kC, prescribe_on_boundary(meshes[m], u), Eigen::VectorXd::Zero(element.unknowns()));
     EXPECT_LT(largest_error(meshes[m], x, u), 1e-12);
@@ -100,18 +99,18 @@ TEST(Q8, PureBendingIsExactOnAffineElements) {
 
 TEST(Q8, OneElementHasOneHourglassModeTwoHaveNone) {
   const Mesh one = rectangle_mesh(1, 1, 1, 1), two = rectangle_mesh(2, 1, 2, 1);
-  EXPECT_EQ(zero_modes(free_matrix(Element(one))), 3 + 1);  // rigid motions, and the hourglass
-  EXPECT_EQ(zero_modes(free_matrix(Element(two))), 3);
+  EXPECT_EQ(zero_modes(free_matrix(PlaneStrainQ8(one))), 3 + 1);  // rigid motions, and the hourglass
+  EXPECT_EQ(zero_modes(free_matrix(PlaneStrainQ8(two))), 3);
   Mesh distorted = rectangle_mesh(1, 1, 3, 3);
   distort(distorted, 0.3, 3);
-  EXPECT_EQ(zero_modes(free_matrix(Element(distorted))), 3);
+  EXPECT_EQ(zero_modes(free_matrix(PlaneStrainQ8(distorted))), 3);
 }
 
 /// Lame: u(a) = p a (1 + nu) / E (b^2 + (1 - 2 nu) a^2) / (b^2 - a^2) = 1.484375e-3 for a, b, p, E, nu = 1, 3, 1, 1000,
 /// 1/4.
 double lame_error(int n) {
   const Mesh mesh = annulus_mesh(1, 3, 90, n, n);
-  const Element element(mesh);
+  const PlaneStrainQ8 element(mesh);
   std::map<int, double> prescribed;
   for (const int node : edge_nodes(mesh, "start")) prescribed[2 * node + 1] = 0;
   for (const int node : edge_nodes(mesh, "end")) prescribed[2 * node] = 0;
@@ -138,13 +137,13 @@ TEST(Q8, MatrixIsTheDerivativeOfTheForce) {
   for (std::size_t n = 0; n < mesh.nodes.size(); ++n) {
     mesh.nodes[n] += 0.1 * Point2(std::sin(3.0 * static_cast<double>(n)), std::cos(5.0 * static_cast<double>(n)));
   }
-  const Element element(mesh);
+  const PlaneStrainQ8 element(mesh);
   AnalyticPoints points(std::vector<AnalyticLaw>(4, JaumannLaw{1000, 0.25, 50}));
   const auto force = [&](const Eigen::VectorXd& x) {
     const auto F = element.deformation(x);
     std::vector<Tensor2> stress;
     for (const Response& r : points.evaluate(F, Operator::none)) stress.push_back(r.stress);
-    return element.force(0, x, F, stress);
+    return element.force(0, {x, {}, F}, stress);
   };
   const std::vector<int> dofs = element.dofs(0);
   Eigen::VectorXd x(16);
@@ -153,7 +152,7 @@ TEST(Q8, MatrixIsTheDerivativeOfTheForce) {
   std::vector<Tensor4> dPdF;
   const auto responses = points.evaluate(F, Operator::tangent);
   for (int q = 0; q < 4; ++q) dPdF.push_back(piola_tangent(responses[q].stiffness, responses[q].stress, F[q]));
-  const Eigen::MatrixXd K = element.matrix(0, x, F, dPdF, true);
+  const Eigen::MatrixXd K = element.matrix(0, {x, F, dPdF, true, 0});
   const Eigen::MatrixXd all = difference_jacobian(force, x, 1e-6);
   Eigen::MatrixXd reference(16, 16);
   for (int j = 0; j < 16; ++j) reference.col(j) = all.col(dofs[j]);
@@ -162,7 +161,7 @@ TEST(Q8, MatrixIsTheDerivativeOfTheForce) {
 
 TEST(Q8, RigidMotionLeavesOnlyTheRotation) {
   const Mesh mesh = square_meshes()[2];
-  const Element element(mesh);
+  const PlaneStrainQ8 element(mesh);
   const Eigen::Rotation2Dd R(0.8);
   Eigen::VectorXd x(element.unknowns());
   for (std::size_t n = 0; n < mesh.nodes.size(); ++n) {
@@ -177,7 +176,7 @@ TEST(Q8, TurnedInsideOutIsTheUsersMistake) {
   Mesh mesh = rectangle_mesh(1, 1, 1, 1);
   auto& nodes = mesh.elements[0];
   nodes = {nodes[0], nodes[3], nodes[2], nodes[1], nodes[7], nodes[6], nodes[5], nodes[4]};
-  EXPECT_THROW(Element{mesh}, UserError);
+  EXPECT_THROW(PlaneStrainQ8{mesh}, UserError);
 }
 
 }  // namespace

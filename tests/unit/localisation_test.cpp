@@ -79,10 +79,10 @@ TEST(Localisation, OperatorsTellItOfTheirTangents) {
   const std::vector<Response> reference = points.evaluate(start, Operator::elastic);
   SolverParameters parameters;
   parameters.global_operator = GlobalOperator::quasi_newton;
-  PointOperators learned(parameters, reference);
+  PointOperators learned(parameters, reference, kPlaneStrain);
   EXPECT_NEAR(learned.acoustic_determinants(start, reference).at(0), 1, 1e-12);
   parameters.global_operator = GlobalOperator::tangent;
-  const PointOperators consistent(parameters, reference);
+  const PointOperators consistent(parameters, reference, kPlaneStrain);
   const std::vector<Tensor2> F = {Tensor2(Eigen::Vector3d(1.01, 0.99, 1).asDiagonal())};
   const std::vector<Response> answer = points.evaluate(F, Operator::tangent);
   EXPECT_LT(consistent.acoustic_determinants(F, answer).at(0), 0);
@@ -90,7 +90,7 @@ TEST(Localisation, OperatorsTellItOfTheirTangents) {
   learned.learn(F, answer);  // bounded from below: nearly singular at most
   EXPECT_LT(learned.acoustic_determinants(F, answer).at(0), 0.5);
   parameters.global_operator = GlobalOperator::elastic;
-  EXPECT_TRUE(PointOperators(parameters, reference).acoustic_determinants(F, answer).empty());
+  EXPECT_TRUE(PointOperators(parameters, reference, kPlaneStrain).acoustic_determinants(F, answer).empty());
 }
 
 }  // namespace

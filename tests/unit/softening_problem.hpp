@@ -6,6 +6,7 @@
 #include "analytic_points.hpp"
 #include "loads.hpp"
 #include "nonlinear_solver.hpp"
+#include "plane_strain_q8.hpp"
 #include "second_gradient_q8.hpp"
 
 namespace femxdem {
@@ -13,7 +14,7 @@ namespace femxdem {
 /// Finite elements on laws in closed form with their solver: what a run holds, for tests.
 struct SofteningProblem {
   std::unique_ptr<Mesh> mesh;  // has an address of its own: the element refers to it
-  std::unique_ptr<Element> element;
+  std::unique_ptr<Formulation> element;
   std::unique_ptr<AnalyticPoints> points;
   std::unique_ptr<Loads> loads;
   std::unique_ptr<NonlinearSolver> solver;
@@ -21,10 +22,6 @@ struct SofteningProblem {
   /// Element, points and loads are there: makes the solver.
   void start(const SolverParameters& parameters) {
     solver = std::make_unique<NonlinearSolver>(*element, *points, *loads, parameters);
-    if (auto* second_gradient = dynamic_cast<SecondGradientQ8*>(element.get())) {
-      const Tensor4& C = solver->committed().responses.front().stiffness;
-      second_gradient->set_penalty(parameters.penalty * C(pair(0, 0), pair(0, 0)));
-    }
   }
 
   double reaction(const std::string& edge, int component) const {
@@ -80,7 +77,7 @@ inline SeriesCost run_to(SofteningProblem& problem, double end_time, double step
 /// end = 0 it is pulled by a traction equal to the time instead, whose factor is released.
 inline SofteningProblem bilinear_bar(int n, double end, const SolverParameters& parameters) {
   SofteningProblem p{std::make_unique<Mesh>(rectangle_mesh(1, 1.0 / n, n, 1)), {}, {}, {}, {}};
-  p.element = std::make_unique<SecondGradientQ8>(*p.mesh, one_parameter_law(0.04), 0.0);
+  p.element = std::make_unique<SecondGradientQ8>(*p.mesh, one_parameter_law(0.04));
   std::vector<AnalyticLaw> laws(p.element->points(), BilinearLaw{100, -10, 0.01, 0, 0});
   for (int q = 0; q < kPointsPerElement; ++q)
     laws[kPointsPerElement * (n / 2) + q] = BilinearLaw{100, -10, 0.01 * (1 - 1e-4), 0, 0};
@@ -119,9 +116,9 @@ inline SofteningProblem softening_biaxial(int nx, double D, const SolverParamete
                                           double hardening = -5e5) {
   SofteningProblem p{std::make_unique<Mesh>(rectangle_mesh(1, 2, nx, 2 * nx)), {}, {}, {}, {}};
   if (D > 0) {
-    p.element = std::make_unique<SecondGradientQ8>(*p.mesh, one_parameter_law(D), 0.0);
+    p.element = std::make_unique<SecondGradientQ8>(*p.mesh, one_parameter_law(D));
   } else {
-    p.element = std::make_unique<Element>(*p.mesh);
+    p.element = std::make_unique<PlaneStrainQ8>(*p.mesh);
   }
   constexpr double kDegree = 0.017453292519943295;
   const DruckerPragerLaw law{3e7, 0.2, 5e4, 25 * kDegree, 10 * kDegree, hardening, 1e4, 1e5};

@@ -72,17 +72,6 @@ TEST(Tensor, IsotropicStiffnessIsIsotropic) {
   EXPECT_EQ(C(pair(0, 1), pair(0, 2)), 0);
 }
 
-TEST(Tensor, MinorSymmetricPartIsAProjection) {
-  const Tensor4 C = numbered();
-  const Tensor4 S = minor_symmetric(C);
-  EXPECT_LT((minor_symmetric(S) - S).norm(), 1e-15);
-  EXPECT_EQ(S.row(pair(0, 1)), S.row(pair(1, 0)));
-  EXPECT_EQ(S.col(pair(1, 2)), S.col(pair(2, 1)));
-  // the same quadratic form on symmetric tensors
-  const Eigen::Matrix<double, 9, 1> e = kU.reshaped();
-  EXPECT_NEAR(e.dot(S * e), e.dot(C * e), 1e-13);
-}
-
 TEST(PointReport, IsFilledByName) {
   PointReport report;
   report["porosity"] = 0.4;

@@ -79,7 +79,7 @@ struct Cells {
 
 struct OneElement : testing::Test {
   explicit OneElement(const Case& of = one_element())
-      : c(of), problem(c), cells(c, problem.element().points()), solver(problem.start(cells.points)) {}
+      : c(of), problem(c), cells(c, problem.formulation().points()), solver(problem.start(cells.points)) {}
 
   void step() {
     const StepResult result = solver.solve_step(c.control.step);
@@ -159,7 +159,7 @@ TEST_F(OneElement, AnswersAsItsVolumeElement) {
 TEST_F(OneElement, TurnsRigidly) {
   for (int i = 0; i < 3; ++i) step();
   const Equilibrium& loaded = solver.committed();
-  const Element& element = problem.element();
+  const Formulation& element = problem.formulation();
   const Mesh& mesh = problem.mesh();
   const Assembler assembler(element, problem.loads().prescribed_dofs());
   Tensor2 Q;
@@ -177,7 +177,7 @@ TEST_F(OneElement, TurnsRigidly) {
     cells.points.begin_step();
     for (const Response& r : cells.points.evaluate(element.deformation(x), Operator::none))
       stresses.push_back(r.stress);
-    return std::pair(stresses, assembler.force(x, element.deformation(x), stresses));
+    return std::pair(stresses, assembler.force({x, {}, element.deformation(x)}, stresses));
   };
   Eigen::VectorXd further = loaded.x;
   for (std::size_t n = 0; n < mesh.nodes.size(); ++n)

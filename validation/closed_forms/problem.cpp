@@ -5,12 +5,14 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "plane_strain_q8.hpp"
+
 namespace femxdem {
 namespace {
 
-std::unique_ptr<Element> make(const Mesh& mesh, const std::optional<DoubleStiffness>& law) {
-  if (!law) return std::make_unique<Element>(mesh);
-  return std::make_unique<SecondGradientQ8>(mesh, *law, 0.0);
+std::unique_ptr<Formulation> make(const Mesh& mesh, const std::optional<DoubleStiffness>& law) {
+  if (!law) return std::make_unique<PlaneStrainQ8>(mesh);
+  return std::make_unique<SecondGradientQ8>(mesh, *law);
 }
 
 }  // namespace
@@ -65,10 +67,6 @@ void Problem::fix_v(const std::vector<int>& nodes, int c, double value) {
 NonlinearSolver& Problem::start() {
   points_ = std::make_unique<AnalyticPoints>(laws_);
   solver_ = std::make_unique<NonlinearSolver>(*element_, *points_, loads_, parameters);
-  if (auto* second_gradient = dynamic_cast<SecondGradientQ8*>(element_.get())) {
-    const Tensor4& C = solver_->committed().responses.front().stiffness;
-    second_gradient->set_penalty(parameters.penalty * C(pair(0, 0), pair(0, 0)));
-  }
   return *solver_;
 }
 

@@ -27,7 +27,7 @@ class Problem {
   Problem(Mesh mesh, const AnalyticLaw& law, const std::optional<DoubleStiffness>& double_stiffness = std::nullopt);
 
   const Mesh& mesh() const { return mesh_; }
-  Element& element() { return *element_; }
+  Formulation& element() { return *element_; }
   const SecondGradientQ8& second_gradient() const { return dynamic_cast<const SecondGradientQ8&>(*element_); }
   Loads& loads() { return loads_; }
   std::vector<int> all_nodes() const;
@@ -58,7 +58,7 @@ class Problem {
 
  private:
   Mesh mesh_;
-  std::unique_ptr<Element> element_;
+  std::unique_ptr<Formulation> element_;
   Loads loads_;
   std::vector<AnalyticLaw> laws_;
   std::unique_ptr<AnalyticPoints> points_;

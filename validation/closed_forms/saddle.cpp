@@ -17,17 +17,17 @@ MixedProblem::MixedProblem(int nx, int ny, double D)
 }
 
 SparseMatrix MixedProblem::augmented(double r) const {
-  const SecondGradientQ8 element(mesh, one_parameter_law(D), r);
+  const SecondGradientQ8 element(mesh, one_parameter_law(D));
   Assembler assembler(element, prescribed);
   Eigen::VectorXd zero = Eigen::VectorXd::Zero(element.unknowns());
   Eigen::VectorXd rhs = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(assembler.free().size()));
   const std::vector<Tensor2> F(element.points(), Tensor2::Identity());
-  return assembler.matrix(zero, F, std::vector<Tensor4>(element.points(), C), false, zero, rhs);
+  return assembler.matrix({zero, F, std::vector<Tensor4>(element.points(), C), false, r}, zero, rhs);
 }
 
 SparseMatrix MixedProblem::saddle(double scale) const {
   const SparseMatrix K = augmented(0);
-  const SecondGradientQ8 element(mesh, one_parameter_law(D), 0);
+  const SecondGradientQ8 element(mesh, one_parameter_law(D));
   std::vector<int> equation(element.unknowns(), -1);
   const Assembler assembler(element, prescribed);
   for (std::size_t i = 0; i < assembler.free().size(); ++i) equation[assembler.free()[i]] = static_cast<int>(i);
