@@ -109,6 +109,14 @@ struct CompactArrays {
   double* start = nullptr;                              ///< (2, spheres, 3) of the power iteration
 };
 
+template <class F>
+void for_each_contact_array(const CompactArrays& a, F f) {
+  f(a.i), f(a.j), f(a.shift), f(a.class_of);
+  for (double* array : {a.kn, a.ks, a.unp, a.normal_force}) f(array);
+  for (double* array : a.shear) f(array);
+  for (double* array : a.normal) f(array);
+}
+
 /// One block of memory with a header and the arrays of CompactArrays.
 class CompactBlock {
  public:

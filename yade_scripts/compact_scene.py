@@ -11,6 +11,7 @@ import numpy as np
 
 import contact_laws
 
+UNIT_TAG = "femxdem_units_of_time_in_a_second"  # a power of two: conversions change no digit
 MAGIC = b"fxdscene"
 VERSION = 1
 COHESIVE, FRICTION = 0, 1
@@ -130,7 +131,7 @@ def export(O):
     contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
     safety = contact_laws.time_step_safety(O)
     follows = safety is not None and contact_laws.constant_stiffness(O) is None
-    counts = [VERSION, law, len(O.bodies), len(contacts), O.iter, int(follows)]
+    counts = [VERSION, law, len(O.bodies), len(contacts), _steps_made(O), int(follows)]
     parts = [np.array(counts, dtype=np.int64), _numbers(O, law, safety if follows else math.nan)]
     parts += _sphere_arrays(O) + _contact_arrays(O, law, contacts)
     if follows:  # of the power iteration, as in time_step.critical_time_step
@@ -138,31 +139,44 @@ def export(O):
     return MAGIC + b"".join(np.ascontiguousarray(p).tobytes() for p in parts)
 
 
+def _unit(O):
+    """Units of the scene's time in a second; exports are in seconds."""
+    return float(O.tags[UNIT_TAG]) if UNIT_TAG in O.tags.keys() else 1.0
+
+
+def _steps_made(O):
+    """The count by which contacts become adhesive."""
+    return O.iter
+
+
 def _numbers(O, law, safety):
-    newton, cell, physics = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0]
+    newton, cell, physics, unit = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0], _unit(O)
     L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator
-    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf, L, newton.prevVelGrad)]
+    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf)]
+    tensors += [unit * np.array(T).ravel() for T in (L, newton.prevVelGrad)]
     new = contact_laws.adhesion_of_new_contacts(O) or (math.nan, math.nan)
     constants = [getattr(physics, name, None) if law == FRICTION else None for name in ("kn", "ks")]
     constants = [math.nan if maker is None else maker.val for maker in constants]
-    density = float(np.mean([b.mat.density for b in O.bodies]))
+    scene_density = float(np.mean([b.mat.density for b in O.bodies]))
     diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
-    solid = sum(b.state.mass for b in O.bodies) / density
-    return np.concatenate([[O.dt, newton.damping], *tensors, new, constants, [safety, density, diameter, solid]])
+    solid = sum(b.state.mass for b in O.bodies) / scene_density
+    last = [safety, scene_density / unit**2, diameter, solid]
+    return np.concatenate([[O.dt / unit, newton.damping], *tensors, new, constants, last])
 
 
 def _sphere_arrays(O):
     bodies = list(O.bodies)
     states, materials = [b.state for b in bodies], [b.mat for b in bodies]
     forces = [[(list(f(b.id))) for b in bodies] for f in (O.forces.f, O.forces.t)]
-    turned = [s.ori * s.refOri.inverse() for s in states]
+    turned, unit = [s.ori * s.refOri.inverse() for s in states], _unit(O)
     return [
-        *(_vectors(states, name) for name in ("pos", "vel", "angVel")),
+        _vectors(states, "pos"),
+        *(unit * _vectors(states, name) for name in ("vel", "angVel")),
         *map(np.array, forces),
         np.array([(q[3], q[0], q[1], q[2]) for q in turned]),
         _scalars([b.shape for b in bodies], "radius"),
-        _scalars(states, "mass"),
-        _vectors(states, "inertia")[:, 0],
+        _scalars(states, "mass") / unit**2,
+        _vectors(states, "inertia")[:, 0] / unit**2,
         _scalars(materials, "young"),
         _scalars(materials, "poisson"),
         np.array([math.tan(m.frictionAngle) for m in materials]),
@@ -196,7 +210,7 @@ def _contact_arrays(O, law, contacts):
 def _last_look(O):
     """Contacts made real after that step number become adhesive at the next look (contact_laws.run)."""
     every = contact_laws.EVERY
-    return (O.iter // every + 1) * every - 2 * every
+    return (O.iter // every - 1) * every
 
 
 def _normal_forces(forces, normal, elastic, adhesion):
@@ -263,9 +277,9 @@ def write_back(O, exported):
     scene = Scene(exported)
     if len(O.bodies) != len(scene.radius):
         raise RuntimeError(f"A state of {len(scene.radius)} spheres does not fit a YADE scene of {len(O.bodies)}.")
-    newton, O.dt = O.engines[-1], 0.0
+    newton, unit, O.dt = O.engines[-1], _unit(O), 0.0
     _set_cell(O, scene, np.zeros((3, 3)))
-    while O.iter % contact_laws.EVERY != (scene.iteration - 2) % contact_laws.EVERY:
+    while _steps_made(O) % contact_laws.EVERY != (scene.iteration - 2) % contact_laws.EVERY:
         _again(O)
     _place(O, scene, _enlargement(scene))
     O.interactions.clear()
@@ -278,14 +292,14 @@ def write_back(O, exported):
     _set_contacts(_matched(O, scene), scene, "forces", O.iter)
     O.forces.f(0, True)  # YADE forgets nothing in a reset that it has not summed before
     O.forces.reset(False)
-    for b, v, w, f, t, turned in zip(O.bodies, scene.v, scene.w, scene.f, scene.t, scene.turned):
+    for b, v, w, f, t, turned in zip(O.bodies, scene.v / unit, scene.w / unit, scene.f, scene.t, scene.turned):
         b.state.vel, b.state.angVel = v, w
         b.state.ori = Quaternion(*turned) * b.state.refOri
         O.forces.addF(b.id, tuple(f))
         O.forces.addT(b.id, tuple(t))
-    _set_cell(O, scene, scene.previous_L)
-    O.cell.velGrad = _matrix(scene.L)
-    newton.damping, O.dt = scene.damping, scene.time_step
+    _set_cell(O, scene, scene.previous_L / unit)
+    O.cell.velGrad = _matrix(scene.L / unit)
+    newton.damping, O.dt = scene.damping, scene.time_step * unit
 
 
 def _set_cell(O, scene, L):
