@@ -109,6 +109,8 @@ CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, long sample
   return result;
 }
 
+bool CompactCell::flip() { return femxdem::flip(*block_); }
+
 Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }
 Row3 CompactCell::stretch() const { return block_->header().trsf; }
 double CompactCell::unbalanced_force() const { return femxdem::unbalanced_force(block_->arrays()); }

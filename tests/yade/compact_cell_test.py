@@ -238,6 +238,29 @@ class Limits(unittest.TestCase):
             for _ in range(500):
                 c.deform(np.diag([-1.0, 1.0, 0.0]) * 0.3 / c.info()["time_scale"], 100)
 
+    def test_a_long_shear_goes_on_in_flipped_cells(self):
+        """F_12 = 3; at every hundredth the cell is flipped by hand: stress and contacts stay, a path beside it too."""
+        c = cell("adhesive")
+        rate, dt, flips = 2e-2 / c.info()["time_scale"], c.info()["time_step"], 0
+        L = np.array([[0, rate, 0], [0, 0, 0], [0, 0, 0]])
+        steps = round(0.05 / (rate * dt))
+        for _ in range(60):
+            c.deform(L, steps)
+            flipped = c.copy()
+            if flipped.flip():
+                flips += 1
+                a, b = (compact_scene.Scene(v.to_scene()) for v in (c, flipped))
+                self.assertEqual([(a.ids != b.ids).any(), (a.x != b.x).any(), (a.shift != b.shift).any()], [False, False, True])
+                for _ in range(2):
+                    scale = np.abs(c.stress()).max()
+                    np.testing.assert_allclose(flipped.stress(), c.stress(), rtol=0, atol=1e-9 * scale)
+                    flipped.deform(L, 5)
+                    c.deform(L, 5)
+        self.assertGreater(flips, 10)
+        np.testing.assert_allclose(c.stretch(), np.eye(3) + np.array(L) * (c.stretch()[0, 1] / rate), rtol=0, atol=1e-12)
+        self.assertGreater(c.stretch()[0, 1], 2.9)
+        self.assertFalse(c.copy().flip() and c.flip() and c.flip(), "the shortest cell has none shorter")
+
     def test_no_steps_change_nothing(self):
         c = cell("friction")
         before = c.save()
