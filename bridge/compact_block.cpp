@@ -64,6 +64,18 @@ std::size_t size_of(const CompactHeader& header) {
   return lay_out(nullptr, header, nowhere);
 }
 
+/// What lies behind the spheres, contacts and pairs depends on how many the kernel takes at a time.
+void clear_padding(const CompactArrays& a) {
+  const CompactHeader& h = *a.header;
+  for (std::size_t s = h.spheres; s < padded(h.spheres); ++s) {
+    a.spheres[s] = {};
+    a.mass[s] = a.inertia[s] = a.turned[0][s] = 1;  // the integrator divides by them
+    a.turned[1][s] = a.turned[2][s] = a.turned[3][s] = 0;
+  }
+  for_each_contact_array(a, [&](auto* array) { std::fill(array + h.contacts, array + padded(h.contact_capacity), 0); });
+  std::fill(a.pairs + h.pairs, a.pairs + h.pair_capacity, CompactPair{});
+}
+
 /// FNV-1a over words of eight bytes in four lanes; the checksum's own place counts as zero.
 std::uint64_t checksum(std::string_view bytes) {
   constexpr std::uint64_t kPrime = 0x100000001b3ULL;
@@ -106,6 +118,7 @@ CompactBlock::CompactBlock(const CompactHeader& header) {
   first.bytes = bytes;
   std::memcpy(lines_.data(), &first, sizeof first);
   bind();
+  clear_padding(arrays_);
 }
 
 CompactBlock::CompactBlock(std::string_view saved) {
@@ -156,6 +169,7 @@ void CompactBlock::grow(std::size_t contacts, std::size_t pairs) {
 }
 
 std::string CompactBlock::save() const {
+  clear_padding(arrays_);
   std::string bytes(reinterpret_cast<const char*>(lines_.data()), lines_.size() * kLine);
   const std::uint64_t sum = checksum(bytes);
   std::memcpy(bytes.data() + offsetof(CompactHeader, checksum), &sum, sizeof sum);

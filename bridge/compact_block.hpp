@@ -85,7 +85,6 @@ struct CompactHeader {
   double constant_kn = 0, constant_ks = 0;    ///< of later contacts [N/m]; NaN: from the materials
   double safety = std::numeric_limits<double>::quiet_NaN();  ///< of the time step; NaN: it follows nothing
   double density = 0, mean_diameter = 0, solid_volume = 0;   ///< [kg/m^3], [m], [m^3]
-  double in_a_second = 1;  ///< units of time, in which all but the density counts (yade_scripts/unit_of_time.py)
 };
 
 /// Where everything of a block is. All arrays are as long as their capacity, rounded up to kLanes, and start at a cache
@@ -109,6 +108,14 @@ struct CompactArrays {
   CompactPair* pairs = nullptr;                         ///< by gap, the largest first
   double* start = nullptr;                              ///< (2, spheres, 3) of the power iteration
 };
+
+template <class F>
+void for_each_contact_array(const CompactArrays& a, F f) {
+  f(a.i), f(a.j), f(a.shift), f(a.class_of);
+  for (double* array : {a.kn, a.ks, a.unp, a.normal_force}) f(array);
+  for (double* array : a.shear) f(array);
+  for (double* array : a.normal) f(array);
+}
 
 /// One block of memory with a header and the arrays of CompactArrays.
 class CompactBlock {

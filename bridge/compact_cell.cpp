@@ -43,12 +43,6 @@ class Mean {
   long last_step_ = 0, count_ = 0;
 };
 
-/// A rate in the block's unit of time.
-Row3 in_scene(Row3 L, double in_a_second) {
-  for (double& rate : L) rate /= in_a_second;
-  return L;
-}
-
 }  // namespace
 
 CompactCell::CompactCell() = default;
@@ -98,7 +92,7 @@ CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, long sample
   const auto started = std::chrono::steady_clock::now();
   Deformed result;
   result.mean_stress.fill(std::numeric_limits<double>::quiet_NaN());
-  if (steps > 0) block_->header().L = in_scene(L, block_->header().in_a_second);
+  if (steps > 0) block_->header().L = L;
   Mean mean;
   try {
     if (sample_every > 0) mean.add(0, stress());
@@ -115,6 +109,8 @@ CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, long sample
   return result;
 }
 
+bool CompactCell::flip() { return femxdem::flip(*block_); }
+
 Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }
 Row3 CompactCell::stretch() const { return block_->header().trsf; }
 double CompactCell::unbalanced_force() const { return femxdem::unbalanced_force(block_->arrays()); }
@@ -124,7 +120,7 @@ PointReport CompactCell::report() const { return femxdem::report(block_->arrays(
 VeInfo CompactCell::info() const {
   const CompactHeader& h = block_->header();
   const double pressure = femxdem::pressure(love_weber(block_->arrays()));
-  return {h.time_step / h.in_a_second,    time_scale(h, pressure), determinant(h.H),
+  return {h.time_step,    time_scale(h, pressure), determinant(h.H),
           static_cast<double>(h.spheres), h.mean_diameter,         pressure};
 }
 

@@ -66,6 +66,10 @@ class CompactCell {
   /// the start, after every so many steps and at the end for the mean; 0: no mean (NaN).
   Deformed deform(const std::array<double, 9>& L, long steps, long sample_every = 0);
 
+  /// Replaces the cell by the shortest one of the same lattice, as deform does by itself before a sheared cell becomes
+  /// too narrow: stress and contacts stay to round-off, so that shear of any size goes on. Whether it was another.
+  bool flip();
+
   /// Cauchy stress of Love and Weber, (1/V) sum (normal + shear force) (x) branch in the order of the contacts' ids,
   /// symmetrised [Pa].
   std::array<double, 9> stress() const;

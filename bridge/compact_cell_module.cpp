@@ -84,6 +84,7 @@ PYBIND11_MODULE(compact_cell, module) {
            [](const CompactCell& c, bool relaxed) {
              return array(c.stiffness(relaxed), {3, 3, 3, 3});
            })
+      .def("flip", &CompactCell::flip)
       .def("unbalanced_force", &CompactCell::unbalanced_force)
       .def("follow_network", &CompactCell::follow_network)
       .def("report", &report)

@@ -11,16 +11,6 @@ namespace {
 constexpr double kSkin = 0.4;  ///< of the smallest radius
 constexpr int kFewBins = 3;    ///< with fewer along a direction, neighbours would be met twice
 
-/// Distances of opposite faces of the cell [m].
-std::array<double, 3> widths(const Row3& inverse_H) {
-  std::array<double, 3> w;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double* row = &inverse_H[3 * k];
-    w[k] = 1 / std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
-  }
-  return w;
-}
-
 /// Spheres sorted into bins of the cell at least `reach` wide.
 class Bins {
  public:
@@ -118,8 +108,7 @@ void make_list(CompactBlock& block) {
   const CompactHeader& h = block.header();
   const Row3 inverse_H = inverse(h.H);
   const std::array<double, 3> width = widths(inverse_H);
-  const double largest = 2 * h.max_radius, room = 0.5 * *std::min_element(width.begin(), width.end()) - largest;
-  const double skin = std::min(kSkin * h.min_radius, 0.99 * room);
+  const double largest = 2 * h.max_radius, skin = std::min(kSkin * h.min_radius, 0.99 * room(h));
   if (!(skin > 1e-3 * h.min_radius))
     throw std::runtime_error(
         "The cell has become too narrow for its largest grains, which could touch one another twice: use more grains "

@@ -155,7 +155,7 @@ PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   r["inertial_number"] = trial.rate * time_scale(h, pressure(s));
   r["unbalanced_force"] = unbalanced_force(a);
   r["porosity"] = 1 - h.solid_volume / determinant(h.H);
-  r["time_step"] = h.time_step / h.in_a_second;
+  r["time_step"] = h.time_step;
   r["dem_steps"] = trial.steps;
   r["seconds"] = r["engine_seconds"] = trial.seconds;
   return r;

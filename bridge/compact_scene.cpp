@@ -66,7 +66,7 @@ void header_numbers(Stream& s, Header& h) {
   for (auto* tensor : {&h.H, &h.trsf, &h.L, &h.previous_L})
     for (auto& number : *tensor) s.template number<double>(number);
   for (auto* number : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
-                       &h.mean_diameter, &h.solid_volume, &h.in_a_second})
+                       &h.mean_diameter, &h.solid_volume})
     s.template number<double>(*number);
 }
 
@@ -170,12 +170,6 @@ void fill_contacts(const CompactArrays& a, const std::vector<SceneContact>& cont
   }
 }
 
-/// Padding that the integrator may divide by.
-void fill_padding(const CompactArrays& a) {
-  const std::size_t n = a.header->spheres, lanes = CompactArrays::kLanes;
-  for (std::size_t k = n; k < (n + lanes - 1) / lanes * lanes; ++k) a.mass[k] = a.inertia[k] = a.turned[0][k] = 1;
-}
-
 /// A block without contacts from the head of an export; the reader then stands before the contacts.
 struct Head {
   CompactHeader header;
@@ -241,7 +235,6 @@ CompactBlock block_of_scene(std::string_view exported) {
     std::copy_n(from, h.spheres, to);
   if (h.start_vectors)
     for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) reader.number<double>(a.start[k]);
-  fill_padding(a);
   fill_contacts(a, contacts, class_of);
   make_list(block);
   return block;

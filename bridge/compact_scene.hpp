@@ -12,7 +12,7 @@ namespace femxdem {
 ///   "fxdscene"; whole numbers: version 1, law (CompactLaw), spheres n, contacts m, iteration, start vectors (0 or 1);
 ///   numbers: time step, damping, H (9), trsf (9), L (9), P (9), adhesion and friction of new contacts (NaN: none),
 ///   kn and ks of new contacts (NaN: from the materials), safety of the time step (NaN: it follows nothing), density,
-///   mean diameter, volume of the grains, units of time in a second;
+///   mean diameter, volume of the grains;
 ///   of the spheres: x, v, w, f, t (n, 3 each), rotation since the reference (n, 4), radius, mass, inertia, young,
 ///   poisson, tangent of the friction angle (n each);
 ///   of the contacts: whole numbers ids (m, 2), shift (m, 3), waits for adhesion (m); numbers kn, ks, normal adhesion,

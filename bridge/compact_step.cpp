@@ -73,15 +73,6 @@ bool touch(const CompactHeader& h, const CompactArrays& a, const CompactPair& p)
   return r * r - (d[0] * d[0] + (d[1] * d[1] + d[2] * d[2])) >= 0;
 }
 
-/// Calls f on every array of the contacts.
-template <class F>
-void for_each_array(const CompactArrays& a, F f) {
-  f(a.i), f(a.j), f(a.shift), f(a.class_of);
-  f(a.kn), f(a.ks), f(a.unp), f(a.normal_force);
-  for (double* s : a.shear) f(s);
-  for (double* n : a.normal) f(n);
-}
-
 /// Both stiffnesses in the order in which YADE's Ip2 functors multiply; or the constants of a MatchMaker.
 void set_stiffness(const CompactArrays& a, std::uint32_t c, const CompactPair& p) {
   const double Ea = a.young[p.i], Eb = a.young[p.j], Va = a.poisson[p.i], Vb = a.poisson[p.j];
@@ -105,7 +96,8 @@ void insert_contact(CompactBlock& block, const CompactPair& p) {
   const CompactArrays& a = block.arrays();
   std::uint32_t at = static_cast<std::uint32_t>(std::lower_bound(a.i, a.i + h->contacts, p.i) - a.i);
   while (at < h->contacts && a.i[at] == p.i && a.j[at] < p.j) ++at;
-  for_each_array(a, [&](auto* array) { std::copy_backward(array + at, array + h->contacts, array + h->contacts + 1); });
+  for_each_contact_array(
+      a, [&](auto* array) { std::copy_backward(array + at, array + h->contacts, array + h->contacts + 1); });
   ++h->contacts;
   a.i[at] = p.i, a.j[at] = p.j, a.shift[at] = p.shift;
   a.class_of[at] = class_of_new(a, std::min(a.tangent[p.i], a.tangent[p.j]));
@@ -144,7 +136,7 @@ void remove_contacts(CompactBlock& block, const std::uint32_t* lost, std::size_t
     a.pairs[h.pairs++] = {a.i[c], a.j[c], a.shift[c], std::numeric_limits<float>::lowest()};
     if (a.classes[a.class_of[c]].when_aged >= 0) --h.new_contacts;
   }
-  for_each_array(a, [&](auto* array) {
+  for_each_contact_array(a, [&](auto* array) {
     std::uint32_t to = lost[0];
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t from = lost[k] + 1, end = k + 1 < count ? lost[k + 1] : h.contacts;
@@ -190,6 +182,7 @@ std::uint32_t class_of_new(const CompactArrays& a, double tangent) {
 }
 
 void step(CompactBlock& block) {
+  flip_when_narrow(block);
   Row3 G;
   const double reach = move(block.header(), block.arrays(), G);
   ++block.header().iteration;

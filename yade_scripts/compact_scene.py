@@ -12,8 +12,8 @@ import numpy as np
 import contact_laws
 import unit_of_time
 
-MAGIC = b"fxdscene"
 LATER = 1 << 62  # a step number after the last look for new contacts, whenever that was
+MAGIC = b"fxdscene"
 VERSION = 1
 COHESIVE, FRICTION = 0, 1
 LAWS = {
@@ -141,31 +141,33 @@ def export(O):
 
 
 def _numbers(O, law, safety):
-    newton, cell, physics = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0]
+    newton, cell, physics, unit = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0], unit_of_time.of(O).in_a_second
     L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator
-    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf, L, newton.prevVelGrad)]
+    tensors = [np.array(T).ravel() for T in (cell.hSize, cell.trsf)]
+    tensors += [unit * np.array(T).ravel() for T in (L, newton.prevVelGrad)]
     new = contact_laws.adhesion_of_new_contacts(O) or (math.nan, math.nan)
     constants = [getattr(physics, name, None) if law == FRICTION else None for name in ("kn", "ks")]
     constants = [math.nan if maker is None else maker.val for maker in constants]
-    unit = unit_of_time.of(O)
-    density = float(np.mean([b.mat.density for b in O.bodies]))
+    scene_density = float(np.mean([b.mat.density for b in O.bodies]))
     diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
-    solid = sum(b.state.mass for b in O.bodies) / density
-    return np.concatenate([[O.dt, newton.damping], *tensors, new, constants, [safety, unit.density(density), diameter, solid, unit.in_a_second]])
+    solid = sum(b.state.mass for b in O.bodies) / scene_density
+    last = [safety, scene_density / unit**2, diameter, solid]
+    return np.concatenate([[O.dt / unit, newton.damping], *tensors, new, constants, last])
 
 
 def _sphere_arrays(O):
     bodies = list(O.bodies)
     states, materials = [b.state for b in bodies], [b.mat for b in bodies]
     forces = [[(list(f(b.id))) for b in bodies] for f in (O.forces.f, O.forces.t)]
-    turned = [s.ori * s.refOri.inverse() for s in states]
+    turned, unit = [s.ori * s.refOri.inverse() for s in states], unit_of_time.of(O).in_a_second
     return [
-        *(_vectors(states, name) for name in ("pos", "vel", "angVel")),
+        _vectors(states, "pos"),
+        *(unit * _vectors(states, name) for name in ("vel", "angVel")),
         *map(np.array, forces),
         np.array([(q[3], q[0], q[1], q[2]) for q in turned]),
         _scalars([b.shape for b in bodies], "radius"),
-        _scalars(states, "mass"),
-        _vectors(states, "inertia")[:, 0],
+        _scalars(states, "mass") / unit**2,
+        _vectors(states, "inertia")[:, 0] / unit**2,
         _scalars(materials, "young"),
         _scalars(materials, "poisson"),
         np.array([math.tan(m.frictionAngle) for m in materials]),
@@ -185,7 +187,8 @@ def _contact_arrays(O, law, contacts):
     on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, kn * (overlap - cohesive["unp"]), -cohesive["normalAdhesion"])
     waits = np.zeros(m, dtype=np.int64)
     if contact_laws.adhesion_of_new_contacts(O):
-        waits[:] = (_scalars(contacts, "iterMadeReal") >= contact_laws.looks_for_new_contacts(O)[1]) & (cohesive["normalAdhesion"] <= 0)
+        _, last_look = contact_laws.looks_for_new_contacts(O)
+        waits[:] = (_scalars(contacts, "iterMadeReal") >= last_look) & (cohesive["normalAdhesion"] <= 0)
     names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     return [
         *(ids, shift, waits, kn, _scalars(phys, "ks")),
@@ -227,7 +230,7 @@ class Scene:
         self.version, self.law, n, m, self.iteration, starts = (int(k) for k in self._take(6))
         self.time_step, self.damping = self._floats(2)
         self.H, self.trsf, self.L, self.previous_L = self._floats(36).reshape(4, 3, 3)
-        self.constants = self._floats(9)
+        self.constants = self._floats(8)
         for name, width in self.SPHERES.items():
             setattr(self, name, self._rows(n, width))
         self.ids, self.shift = self._take(2 * m).reshape(m, 2), self._take(3 * m).reshape(m, 3)
@@ -252,36 +255,36 @@ def write_back(O, exported):
     """Puts a state of the compact engine into the scene of `O`, which rests and was made from the same template.
 
     YADE makes the contacts itself: first between spheres large enough for those that are in tension, then, with their
-    laws, between the true ones; no time passes. The scene's count of steps becomes that of
-    the state. Raises RuntimeError when YADE's contacts are others.
+    laws, between the true ones; no time passes. The scene's count of steps becomes that
+    of the state. Raises RuntimeError when YADE's contacts are others.
     """
     from yade.utils import Quaternion
 
     scene = Scene(exported)
     if len(O.bodies) != len(scene.radius):
         raise RuntimeError(f"A state of {len(scene.radius)} spheres does not fit a YADE scene of {len(O.bodies)}.")
-    newton, O.dt = O.engines[-1], 0.0
+    newton, unit, O.dt = O.engines[-1], unit_of_time.of(O).in_a_second, 0.0
     _set_cell(O, scene, np.zeros((3, 3)))
     _place(O, scene, _enlargement(scene))
     O.interactions.clear()
     _again(O)
     contacts = _matched(O, scene)
     for name in ("laws", "forces"):
-        _set_contacts(contacts, scene, name, O.iter)
+        _set_contacts(contacts, scene, name)
     _place(O, scene, 1.0)
     _again(O)
-    _set_contacts(_matched(O, scene), scene, "forces", O.iter)
+    _set_contacts(_matched(O, scene), scene, "forces")
     contact_laws.set_looks(O, scene.iteration)
     O.forces.f(0, True)  # YADE forgets nothing in a reset that it has not summed before
     O.forces.reset(False)
-    for b, v, w, f, t, turned in zip(O.bodies, scene.v, scene.w, scene.f, scene.t, scene.turned):
+    for b, v, w, f, t, turned in zip(O.bodies, scene.v / unit, scene.w / unit, scene.f, scene.t, scene.turned):
         b.state.vel, b.state.angVel = v, w
         b.state.ori = Quaternion(*turned) * b.state.refOri
         O.forces.addF(b.id, tuple(f))
         O.forces.addT(b.id, tuple(t))
-    _set_cell(O, scene, scene.previous_L)
-    O.cell.velGrad = _matrix(scene.L)
-    newton.damping, O.dt = scene.damping, scene.time_step
+    _set_cell(O, scene, scene.previous_L / unit)
+    O.cell.velGrad = _matrix(scene.L / unit)
+    newton.damping, O.dt = scene.damping, scene.time_step * unit
 
 
 def _set_cell(O, scene, L):
@@ -333,7 +336,7 @@ def _matched(O, scene):
     return found
 
 
-def _set_contacts(contacts, scene, what, now):
+def _set_contacts(contacts, scene, what):
     cohesive = scene.law == COHESIVE
     for at, i in enumerate(contacts):
         p = i.phys

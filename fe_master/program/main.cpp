@@ -95,7 +95,7 @@ VeArguments ve_arguments(const Arguments& arguments) {
 /// Trials that a run will ask of its volume elements, about: three evaluations a step.
 double expected_trials(const Problem& problem) {
   const ControlParameters& control = problem.parameters().control;
-  return 3 * control.end_time / control.max_step * static_cast<double>(problem.element().points());
+  return 3 * control.end_time / control.max_step * static_cast<double>(problem.formulation().points());
 }
 
 int run_on_volume_elements(Problem& problem, RunOptions options) {

@@ -52,7 +52,7 @@ class TimeLoopTest : public OwnFolder {
  protected:
   int run(const Case& c, const AnalyticLaw& law, Existing existing = Existing::refuse) {
     Problem problem(c);
-    AnalyticPoints points(std::vector<AnalyticLaw>(problem.element().points(), law));
+    AnalyticPoints points(std::vector<AnalyticLaw>(problem.formulation().points(), law));
     RunOptions options;
     options.folder = folder_;
     options.existing = existing;

@@ -1,0 +1,300 @@
+"""The compact cell against YADE with loopOnSortedInteractions: equal bits; its reports against YADE's; its states."""
+
+import unittest
+from functools import cache
+from unittest import mock
+
+import numpy as np
+
+import compact_cell
+import compact_scene
+import contact_laws
+from compact_cell import CompactCell
+
+from cells import FIELDS, element, engine, measure, mandel, select, stiffness
+
+SPHERES = 100
+SPECS = {
+    "friction": {"contact_law": "friction"},
+    "adhesive": {"cohesion": 1.0},
+    "bonded": {"cohesion": 1.0, "contact_law": "bonded"},
+    "adhesive new contacts": {"cohesion": 1.0, "new_contacts": "adhesive", "seed": 2},
+    "stiff and shear-stiff": {"contact_law": "friction", "kappa": 10000.0, "stiffness_ratio": 0.2},
+    "soft, wide sizes": {"cohesion": 2.0, "kappa": 100.0, "stiffness_ratio": 2.0, "size_ratio": 4.0},
+}
+SHEAR_AND_ROTATION = np.array([[0.0, 1.5, 0.0], [-0.5, 0.0, 0.3], [0.0, 0.0, 0.0]])
+ROUND_OFF = {"turned"}  # orientations act on nothing; YADE's come from libm's sine
+COUNTED_APART = {"iteration"}
+
+
+def sorted_element(spec):
+    ve = element({"spheres": SPHERES, **spec})
+    select(ve).engines[2].loopOnSortedInteractions = True
+    return ve
+
+
+@cache
+def exported(name):
+    return compact_scene.export(select(sorted_element(SPECS[name])))
+
+
+def cell(name):
+    return CompactCell.from_scene(exported(name))
+
+
+def rates(c, inertial_number=2e-2, seed=1):
+    """Velocity gradients [1/s]: random ones, a reversal, shear with rotation, a hold, expansion and compression."""
+    rng = np.random.default_rng(seed)
+    first, second = rng.standard_normal((2, 3, 3))
+    for L in (first, second, -second, SHEAR_AND_ROTATION, np.zeros((3, 3)), np.eye(3), -np.eye(3)):
+        yield L * inertial_number / c.info()["time_scale"] / max(np.linalg.norm(L), 1e-300)
+
+
+def differences(a, b, but=ROUND_OFF):
+    """Names of what differs between two exports, or how far where only round-off may."""
+    a, b = compact_scene.Scene(a), compact_scene.Scene(b)
+    names = [name for name in vars(a) if not name.startswith("_") and name not in but]
+    for name in but & ROUND_OFF:
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=1e-13)
+    return [name for name in names if not np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)]
+
+
+def on_the_plateau(c):
+    """Contacts in tension at -f_c, or at none because they slide there: their limit of the shear force is mu f_c - mu f_c,
+    zero or what round-off makes of it."""
+    scene = compact_scene.Scene(c.to_scene())
+    at_the_end = (scene.normal_force == -scene.normal_adhesion) | (scene.normal_force == 0)
+    return ((scene.normal_adhesion > 0) & at_the_end).sum()
+
+
+class Bits(unittest.TestCase):
+    def test_an_export_is_read_and_given_back(self):
+        for name in SPECS:
+            self.assertEqual(differences(cell(name).to_scene(), exported(name), set()), [], name)
+
+    def test_equal_yade_after_1_10_and_100_steps_of_every_kernel(self):
+        for name, spec in SPECS.items():
+            ve = sorted_element(spec)
+            O = select(ve)
+            cells = {}
+            for kernel in compact_cell.kernels():
+                cells[kernel] = cell(name)
+            sets = set()
+            for L, steps in zip(rates(cell(name)), (1, 10, 100, 33, 7, 60, 60)):
+                engine().deform(ve, L, steps)
+                state = compact_scene.export(O)
+                sets.add(compact_scene.Scene(state).ids.tobytes())
+                for kernel, c in cells.items():
+                    compact_cell.use_kernel(kernel)
+                    c.deform(L, steps)
+                    self.assertEqual(differences(c.to_scene(), state), [], f"{name}, {kernel}, {steps} steps")
+            self.assertGreater(len(sets), 4, "contacts are lost and gained")
+            saved = {c.save() for c in cells.values()}
+            self.assertEqual(len(saved), 1, f"{name}: kernels differ")
+
+    def test_a_split_of_the_steps_changes_nothing(self):
+        for name in ("bonded", "adhesive new contacts"):
+            one, other = cell(name), cell(name)
+            L = next(rates(one))
+            one.deform(L, 90)
+            for steps in (1, 29, 60):
+                other.deform(L, steps)
+            self.assertEqual(one.save(), other.save())
+
+
+class States(unittest.TestCase):
+    def test_copies_share_nothing_and_an_assignment_brings_the_same_bits(self):
+        base = cell("adhesive")
+        before, trial = base.save(), base.copy()
+        for L in rates(base):
+            trial.assign(base)
+            trial.deform(L, 20)
+            first = trial.save()
+            trial.assign(base)
+            trial.deform(L, 20)
+            self.assertEqual(trial.save(), first)
+        self.assertEqual(base.save(), before)
+
+    def test_a_loaded_state_goes_on_with_equal_bits(self):
+        for name in SPECS:
+            c = cell(name)
+            L = next(rates(c))
+            c.deform(L, 50)
+            other = CompactCell.load(c.save())
+            self.assertEqual(other.save(), c.save())
+            for v in (c, other):
+                v.deform(-L, 50)
+            self.assertEqual(other.save(), c.save())
+
+    def test_what_is_not_a_state_is_refused(self):
+        good = cell("bonded").save()
+        self.assertIsNone(compact_cell.why_invalid(good))
+        version = bytearray(good)
+        version[8] += 1
+        for bad, word in ((good[:-64], "bytes"), (good[:100], "truncated"), (b"", "truncated"), (bytes(version), "version")):
+            self.assertIn(word, compact_cell.why_invalid(bad))
+            with self.assertRaisesRegex(compact_cell.UserError, word):
+                CompactCell.load(bad)
+        rng = np.random.default_rng(0)
+        for at in rng.integers(0, len(good), 200):
+            flipped = bytearray(good)
+            flipped[at] ^= 1 << int(rng.integers(8))
+            self.assertIsNotNone(compact_cell.why_invalid(bytes(flipped)), f"byte {at}")
+
+    def test_what_is_not_an_export_is_refused(self):
+        good = exported("friction")
+        for bad in (b"", b"something", good[:-8], good[:200], good + bytes(8)):
+            with self.assertRaises(compact_cell.UserError):
+                CompactCell.from_scene(bad)
+
+    def test_yade_goes_on_from_a_compact_state_with_equal_bits(self):
+        for name, spec in SPECS.items():
+            ve, c = sorted_element(spec), cell(name)
+            O = select(ve)
+            for L in rates(c):
+                c.deform(L, 30)
+            compact_scene.write_back(O, c.to_scene())
+            self.assertEqual(differences(c.to_scene(), compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
+            for L, steps in zip(rates(c, seed=3), (1, 5, 30)):
+                c.deform(L, steps)
+                engine().deform(ve, L, steps)
+                self.assertEqual(differences(c.to_scene(), compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
+
+    def test_a_state_does_not_fit_a_scene_of_other_spheres(self):
+        ve = element({"spheres": 60, "contact_law": "friction"})
+        with self.assertRaisesRegex(RuntimeError, "100 spheres does not fit"):
+            compact_scene.write_back(select(ve), exported("friction"))
+
+
+class Reports(unittest.TestCase):
+    def test_reports_are_those_of_yades_engine(self):
+        for name, spec in SPECS.items():
+            ve, c = sorted_element(spec), cell(name)
+            for L in rates(c, inertial_number=3e-3):
+                engine().deform(ve, L, 200)  # the engine looks at its contacts' states after so many
+                c.deform(L, 200)
+                stress, report, stretch = measure(ve)
+                np.testing.assert_allclose(c.stress(), stress, rtol=0, atol=1e-12 * np.abs(stress).max())
+                np.testing.assert_array_equal(c.stretch(), stretch)
+                own = c.report()
+                self.assertEqual(set(own), set(FIELDS))
+                either_way = on_the_plateau(c) / max(own["contacts"], 1)
+                self.assertAlmostEqual(own["sliding_contacts"], report["sliding_contacts"], delta=either_way + 1e-12)
+                for field in set(FIELDS) - {"seconds", "engine_seconds", "sliding_contacts"}:
+                    np.testing.assert_allclose(own[field], report[field], rtol=1e-11, atol=1e-13, err_msg=field)
+                self.assertEqual(own["unbalanced_force"], c.unbalanced_force())
+            for key, value in engine().info(ve).items():
+                np.testing.assert_allclose(c.info()[key], value, rtol=1e-12, err_msg=key)
+
+    def test_stiffness_affine_and_relaxed(self):
+        for name in ("friction", "adhesive", "soft, wide sizes"):
+            ve, c = sorted_element(SPECS[name]), cell(name)
+            L = next(rates(c))
+            engine().deform(ve, L, 40)
+            c.deform(L, 40)
+            for relaxed in (False, True):
+                mine, theirs = mandel(c.stiffness(relaxed)), mandel(stiffness(ve, relaxed))
+                np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-10 * np.abs(theirs).max())
+
+    def test_mean_stress_over_the_steps(self):
+        c = cell("adhesive")
+        L, stresses = next(rates(c)), []
+        stepped = c.copy()
+        for _ in range(7):
+            stresses.append(stepped.stress())
+            stepped.deform(L, 1)
+        stresses.append(stepped.stress())
+        whole = c.copy().deform(L, 7, sample_every=1)
+        mean = (0.5 * stresses[0] + sum(stresses[1:-1]) + 0.5 * stresses[-1]) / 7
+        np.testing.assert_allclose(whole, mean, rtol=0, atol=1e-13 * np.abs(mean).max())
+        every_third = c.copy().deform(L, 7, sample_every=3)
+        s = stresses
+        coarse = (1.5 * (s[0] + s[3]) + 1.5 * (s[3] + s[6]) + 0.5 * (s[6] + s[7])) / 7
+        np.testing.assert_allclose(every_third, coarse, rtol=0, atol=1e-13 * np.abs(mean).max())
+        self.assertTrue(np.isnan(c.copy().deform(L, 7)).all())
+
+    def test_the_time_step_follows_the_network(self):
+        ve = sorted_element(SPECS["adhesive"])
+        O = select(ve)
+        safe = O.dt
+        for factor, kept in ((1.5, False), (0.5, False), (0.9, True)):
+            O.dt = factor * safe
+            with mock.patch.object(contact_laws, "constant_stiffness", return_value=None):
+                c = CompactCell.from_scene(compact_scene.export(O))
+                engine().follow_network(ve)
+            c.follow_network()
+            self.assertEqual(O.dt == factor * safe, kept)
+            self.assertAlmostEqual(c.info()["time_step"] / engine().info(ve)["time_step"], 1, delta=1e-12)
+        c = cell("adhesive")
+        before = c.save()
+        c.follow_network()
+        self.assertEqual(c.save(), before, "one stiffness for ever: the step is kept")
+
+
+class Limits(unittest.TestCase):
+    def test_a_cell_that_becomes_too_narrow_is_a_failure(self):
+        c = cell("friction")
+        with self.assertRaisesRegex(RuntimeError, "too narrow"):
+            for _ in range(500):
+                c.deform(np.diag([-1.0, 1.0, 0.0]) * 0.3 / c.info()["time_scale"], 100)
+
+    def test_a_long_shear_goes_on_in_flipped_cells(self):
+        """F_12 = 3; at every hundredth the cell is flipped by hand: stress and contacts stay, a path beside it too."""
+        c = cell("adhesive")
+        rate, dt, flips = 2e-2 / c.info()["time_scale"], c.info()["time_step"], 0
+        L = np.array([[0, rate, 0], [0, 0, 0], [0, 0, 0]])
+        steps = round(0.05 / (rate * dt))
+        for _ in range(60):
+            c.deform(L, steps)
+            flipped = c.copy()
+            if flipped.flip():
+                flips += 1
+                a, b = (compact_scene.Scene(v.to_scene()) for v in (c, flipped))
+                self.assertEqual([(a.ids != b.ids).any(), (a.x != b.x).any(), (a.shift != b.shift).any()], [False, False, True])
+                for _ in range(2):
+                    scale = np.abs(c.stress()).max()
+                    np.testing.assert_allclose(flipped.stress(), c.stress(), rtol=0, atol=1e-9 * scale)
+                    flipped.deform(L, 5)
+                    c.deform(L, 5)
+        self.assertGreater(flips, 10)
+        np.testing.assert_allclose(c.stretch(), np.eye(3) + np.array(L) * (c.stretch()[0, 1] / rate), rtol=0, atol=1e-12)
+        self.assertGreater(c.stretch()[0, 1], 2.9)
+        self.assertFalse(c.copy().flip() and c.flip() and c.flip(), "the shortest cell has none shorter")
+
+    def test_no_steps_change_nothing(self):
+        c = cell("friction")
+        before = c.save()
+        c.deform(np.eye(3), 0)
+        self.assertEqual(c.save(), before)
+
+    def test_what_is_not_covered_is_said(self):
+        def prepared(change):
+            O = select(sorted_element(SPECS["adhesive"]))
+            change(O)
+            return compact_scene.covered(O)
+
+        def functor(O, k):
+            loop = O.engines[2]
+            return (loop.geomDispatcher, loop.physDispatcher, loop.lawDispatcher)[k].functors[0]
+
+        changes = {
+            "interactionDetectionFactor": lambda O: setattr(functor(O, 0), "interactionDetectionFactor", 1.1),
+            "setCohesionOnNewContacts": lambda O: setattr(functor(O, 1), "setCohesionOnNewContacts", True),
+            "always_use_moment_law": lambda O: setattr(functor(O, 2), "always_use_moment_law", True),
+            "momentRotationLaw": lambda O: setattr(O.bodies[3].mat, "momentRotationLaw", True),
+            "the contact of bodies .* momentRotationLaw": lambda O: setattr(
+                next(iter(O.interactions)).phys, "momentRotationLaw", True
+            ),
+            "body 4 has blockedDOFs": lambda O: setattr(O.bodies[4].state, "blockedDOFs", "z"),
+            "three moments of inertia": lambda O: setattr(O.bodies[5].state, "inertia", (1, 2, 3)),
+            "gravity": lambda O: setattr(O.engines[-1], "gravity", (0, 0, -9.81)),
+            "homoDeform": lambda O: setattr(O.cell, "homoDeform", 1),
+            "does not rest": lambda O: O.step(),
+        }
+        self.assertIsNone(prepared(lambda O: None))
+        for sentence, change in changes.items():
+            self.assertRegex(prepared(change) or "covered", sentence)
+
+
+if __name__ == "__main__":
+    unittest.main()
