@@ -30,8 +30,18 @@ def adopt(O):
     return {**names, "reset": _reset(O, kept[-1])}
 
 
+def drives(O, engine):
+    """Whether an engine is of those that adoption drops, but for gravity and its like: it strains, stops or records."""
+    bases = [base for base in DROPPED if base != "FieldApplier"]
+    return engine.dead or type(engine).__name__ in _with_derived(O, bases)
+
+
+def _with_derived(O, bases):
+    return {name for base in bases for name in (base, *_derived(O, base))}
+
+
 def _sort_engines(O):
-    droppable = {name for base in DROPPED for name in (base, *_derived(O, base))}
+    droppable = _with_derived(O, DROPPED)
     kept, dropped = [], []
     for engine in O.engines:
         name = type(engine).__name__
@@ -79,8 +89,43 @@ def _refuse_unsuitable(O, names):
             )
         if not b.dynamic and not b.isClumpMember:
             raise ValueError(f"Body {b.id} of the YADE scene is held (dynamic is False): every grain must be free.")
+    _refuse_partly_held(O)
+    _refuse_permanent_forces(O)
     if O.interactions.countReal() == 0:
         raise ValueError("The YADE scene has no contacts: a volume element must carry a stress.")
+
+
+def _refuse_partly_held(O):
+    """All grains may be blocked alike (a plane of grains: "zXY"), but not some, and not in all translations."""
+    held = {}
+    for b in O.bodies:
+        if not b.isClumpMember:
+            held.setdefault("".join(c for c in "xyz" if c in b.state.blockedDOFs), []).append(b.id)
+    if len(held) > 1:
+        rare = min(held, key=lambda dofs: len(held[dofs]))
+        usual = max(held, key=lambda dofs: len(held[dofs]))
+        raise ValueError(
+            f"{len(held[rare])} of {sum(map(len, held.values()))} grains of the YADE scene, body {held[rare][0]} among them, "
+            f"have their translations blocked by blockedDOFs = \"{rare}\", others by \"{usual}\": a volume element's grains "
+            "must all be free, or blocked alike; set blockedDOFs at the end of the script."
+        )
+    if "xyz" in held:
+        raise ValueError(
+            'All grains of the YADE scene have their translations blocked (blockedDOFs holds "xyz"): they must be free.'
+        )
+
+
+def _refuse_permanent_forces(O):
+    """Forces of O.forces.setPermF are no state of a volume element, and YADE saves them nowhere."""
+    if not O.forces.getPermForceUsed():
+        return
+    pushed = [b.id for b in O.bodies if O.forces.permF(b.id).norm() > 0 or O.forces.permT(b.id).norm() > 0]
+    if pushed:
+        raise ValueError(
+            f"Permanent forces or torques (O.forces.setPermF, setPermT) act on {len(pushed)} bodies of the YADE scene, body "
+            f"{pushed[0]} among them: a volume element is loaded by its cell alone, and YADE does not save them; take them "
+            "off with O.forces.setPermF(id, Vector3.Zero) and let the scene come to rest before the script ends."
+        )
 
 
 def _reset(O, integrator):

@@ -3,6 +3,7 @@
 import numpy as np
 
 import contact_laws
+import viscosity
 from contact_loop import contacts, has_stiffness, values
 
 ITERATIONS = 60
@@ -16,11 +17,17 @@ def set_time_step(O, own, safety):
     from yade.utils import PWaveTimeStep
 
     c = contacts(O)
-    if has_stiffness(c) and not any(b.isClump for b in O.bodies):
-        O.dt = safety * critical_time_step(O, c)
+    clumped = any(b.isClump for b in O.bodies)
+    if has_stiffness(O, c) and not clumped:
+        critical = critical_time_step(O, c)
+        damping = viscosity.damping_ratio(O, critical, own)
+        O.dt = safety * viscosity.damped(critical, damping)
         contact_laws.note_time_step_safety(O, safety)
-        return "contact network"
+        viscosity.note(O, damping)
+        return "contact network with its dashpots" if damping > 0 else "contact network"
     waves = safety * PWaveTimeStep()
+    if not clumped:
+        waves = safety * viscosity.damped(waves / safety, viscosity.damping_ratio(O, waves / safety, own))
     O.dt = own if 0 < own < waves else waves
     return "the scene" if O.dt == own else "P waves"
 
@@ -32,7 +39,7 @@ def follow_network(O):
     safety = contact_laws.time_step_safety(O)
     if safety is None or contact_laws.constant_stiffness(O) or not O.interactions.countReal():
         return
-    safe = safety * critical_time_step(O, contacts(O))
+    safe = safety * viscosity.damped(critical_time_step(O, contacts(O)), viscosity.noted(O))
     if not KEPT[0] <= O.dt / safe <= KEPT[1]:
         O.dt = safe
 

@@ -2,6 +2,7 @@
 
 import math
 import time
+import zlib
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from operator import methodcaller
@@ -9,15 +10,24 @@ from operator import methodcaller
 import numpy as np
 
 import adoption
+import archive_check
 import contact_laws
 import contact_loop
+import continuation
 import packing
 import probing
 import user_scenes
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"source": "prepare", "time_step_safety": 0.8, "arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}
+DEFAULTS = {
+    "source": "prepare",
+    "time_step_safety": 0.8,
+    "arguments": (),
+    "script_steps": 1_000_000,
+    "script_seconds": 600.0,
+    "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
+}
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
@@ -68,30 +78,65 @@ class Engine:
     def make_template(self, spec):
         started = time.perf_counter()
         spec = {**DEFAULTS, **spec}
-        manifest = {"source": spec["source"], "notes": self._make_scene(spec)}
-        own = self.O.dt
-        manifest.update(adoption.adopt(self.O))
-        manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
-        self._to_forces()
+        notes, inputs = self._make_scene(spec)
+        manifest = {"source": spec["source"], "notes": notes, "inputs": sorted(inputs.items())}
+        archive_check.refuse_lost_grains(self.O)
+        own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
+        try:
+            manifest.update(adoption.adopt(self.O))
+            manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
+            self._to_forces()
+            archive_check.refuse_not_finite(self.O, "after its adoption")
+        except Exception:
+            itself.dismiss()
+            raise
         grains = _grains(self.O)
         manifest.update(self._geometry(grains), **self._contact_network(grains))
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
+        made = archive_check.state(self.O)
+        state = self.O.sceneToString()
+        manifest["state"] = f"{len(state)}-{zlib.crc32(state):08x}"
+        manifest["continuation"], said = self._compare(state, made, itself, spec["compare"])
+        notes += said
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
-        return {"state": self.O.sceneToString(), "manifest": manifest}
+        return {"state": state, "manifest": manifest}
+
+    def _compare(self, state, made, itself, steps):
+        """Lets the restored `state` go on for some steps beside the scene `itself` (continuation.Copy); the manifest's entry and
+        sentences. Raises ValueError where the archive does not give back what was `made` (archive_check.State), or what
+        the steps led to."""
+        ve = self.add(state)
+        try:
+            archive_check.refuse_dropped(made, archive_check.state(self.O), self.O, "as it was made")
+            info = self.info(ve)
+            L = continuation.strain_rate(info["time_scale"], info["time_step"])
+            self.deform(ve, L, steps)
+            adopted = archive_check.state(self.O)
+            archive_check.refuse_not_finite(self.O, f"after {steps} steps of a small strain")
+            self.replace(ve, self.save(ve))
+            archive_check.refuse_dropped(adopted, archive_check.state(self.O), self.O, f"after {steps} steps of a small strain")
+        except Exception:
+            itself.dismiss()
+            raise
+        finally:
+            self.remove(ve)
+            self._select(0)
+        theirs = itself.ask((info["time_step"], L, steps))
+        return continuation.report(theirs, adopted, steps, float(np.linalg.norm(L)) * info["time_step"] * steps)
 
     def _make_scene(self, spec):
-        """Fills the current scene as the case says; sentences on what was special."""
+        """Fills the current scene as the case says; sentences on what was special, {file that a script read: hash}."""
         self._select(0)
         self.O.resetThisScene()
         if spec["source"] == "prepare":
             packing.prepare(self.O, spec)
-            return []
+            return [], {}
         if spec["source"] == "scene":
             user_scenes.load_scene(self.O, spec["scene"])
-            return []
+            return [], {}
         if spec["source"] == "script":
             limits = spec["script_steps"], spec["script_seconds"]
             return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
@@ -176,7 +221,7 @@ class Engine:
     def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)
         c, volume = contact_loop.contacts(self.O), self.O.cell.volume
-        if contact_loop.has_stiffness(c) and not self._grains[ve].clumped:
+        if contact_loop.has_stiffness(self.O, c) and not self._grains[ve].clumped:
             kn, kt = contact_loop.stiffnesses(self.O, c)
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)

@@ -1,0 +1,119 @@
+"""What YADE's archive drops, found by saving and restoring: a volume element lives in archives (templates, checkpoints).
+
+Some laws keep a part of their state in attributes that YADE does not save (2023.02a: the shear force of CpmPhys), and
+forces of O.forces.setPermF are in no archive at all. So every template is restored and compared with itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+TOLERANCE = 1e-6  # relative; a restored scene repeats itself to 1e-13
+
+
+@dataclass
+class State:
+    """What a scene answers at rest inside a step, its contact forces being found."""
+
+    stress: np.ndarray  # (3, 3) [Pa], tension positive
+    pairs: list  # (id1, id2) of the m real contacts, sorted
+    normal: np.ndarray  # (m, 3) normal forces [N]; zeros for laws that do not tell them
+    shear: np.ndarray  # (m, 3) shear forces [N]
+    unbalanced: float
+    kinetic: float  # energy [J]
+    elastic: float  # energy of the contacts that know kn and ks [J]
+
+
+def state(O):
+    """The State of YADE's current scene."""
+    from yade._utils import getStress, kineticEnergy, unbalancedForce
+
+    contacts = sorted(O.interactions, key=lambda i: (i.id1, i.id2))
+    forces = {name: np.zeros((len(contacts), 3)) for name in ("normalForce", "shearForce")}
+    elastic = 0.0
+    for k, contact in enumerate(contacts):
+        phys = contact.phys
+        for (name, rows), stiffness in zip(forces.items(), ("kn", "ks")):
+            rows[k] = getattr(phys, name, (0.0, 0.0, 0.0))
+            if getattr(phys, stiffness, 0.0) > 0:
+                elastic += rows[k] @ rows[k] / (2 * getattr(phys, stiffness))
+    stress = np.array(getStress()).reshape(3, 3)
+    pairs = [(i.id1, i.id2) for i in contacts]
+    return State(stress, pairs, *forces.values(), unbalancedForce(), kineticEnergy(), elastic)
+
+
+def differences(a, b):
+    """{what: size} by which State b differs from a: stress over its norm, forces over the norm of all contact forces (those
+    of contacts that only one has count in full), unbalanced force as it is (it is a ratio), contacts as a number, energies
+    over the elastic one of a."""
+    scale = _positive(np.hypot(np.linalg.norm(a.normal), np.linalg.norm(a.shear)))
+    energy = _positive(a.elastic)
+    return {
+        "stress": float(np.linalg.norm(b.stress - a.stress) / _positive(np.linalg.norm(a.stress))),
+        "normal forces": float(_distance(a, b, "normal") / scale),
+        "shear forces": float(_distance(a, b, "shear") / scale),
+        "unbalanced force": abs(b.unbalanced - a.unbalanced),
+        "contacts": len(set(a.pairs) ^ set(b.pairs)),
+        "elastic energy": abs(b.elastic - a.elastic) / energy,
+        "kinetic energy": abs(b.kinetic - a.kinetic) / energy,
+    }
+
+
+def _positive(x):
+    return float(x) if x > 0 else 1.0
+
+
+def _distance(a, b, name):
+    if a.pairs == b.pairs:
+        return np.linalg.norm(getattr(b, name) - getattr(a, name))
+    theirs = dict(zip(b.pairs, getattr(b, name)))
+    mine = dict(zip(a.pairs, getattr(a, name)))
+    zero = np.zeros(3)
+    return np.linalg.norm([theirs.get(p, zero) - mine.get(p, zero) for p in mine.keys() | theirs.keys()])
+
+
+def refuse_not_finite(O, when):
+    """Raises ValueError, naming the law, where stress, contact forces or cell are not numbers."""
+    now = state(O)
+    numbers = (now.stress, now.normal, now.shear, np.array(O.cell.hSize), now.unbalanced)
+    if all(np.isfinite(x).all() for x in numbers):
+        return
+    raise ValueError(
+        f"The YADE scene answers with what is not a number {when} (contact law {law_names(O)}): a volume element must have "
+        "a finite stress; check the attributes of the contacts' physics and the law in the script."
+    )
+
+
+def refuse_lost_grains(O):
+    """Raises ValueError where a grain's position is not a number: the simulation has diverged."""
+    lost = [b.id for b in O.bodies if not np.isfinite(b.state.pos).all()]
+    if lost:
+        raise ValueError(
+            f"The positions of {len(lost)} bodies of the YADE scene, body {lost[0]} among them, are not numbers: its "
+            "simulation has diverged; lower O.dt in the script."
+        )
+
+
+def refuse_dropped(before, after, O, when):
+    """Raises ValueError where the restored State `after` is not that of `before`: names the law and what differs."""
+    found = differences(before, after)
+    parts = [
+        f"{what} by {size:.1e}"
+        for what, size in found.items()
+        if not size <= TOLERANCE and what not in ("elastic energy", "kinetic energy")
+    ]
+    if not parts:
+        return
+    raise ValueError(
+        f"YADE's archive does not keep the whole state of this scene (contact law {law_names(O)}): saved and restored "
+        f"{when}, it differs in {', '.join(parts)} (relative, limit {TOLERANCE:.0e}; unbalanced force {before.unbalanced:.1e} "
+        f"before, {after.unbalanced:.1e} after). A volume element is restored from such archives: use another law."
+    )
+
+
+def law_names(O):
+    """Names of the scene's contact laws."""
+    loop = next((e for e in O.engines if type(e).__name__ == "InteractionLoop"), None)
+    names = [type(f).__name__ for f in loop.lawDispatcher.functors] if loop else []
+    own = [type(e).__name__ for e in O.engines if type(e).__name__.startswith("Law2_")]
+    return ", ".join(names + own) or "none"
