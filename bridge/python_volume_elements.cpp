@@ -60,7 +60,7 @@ PythonVolumeElements::Template PythonVolumeElements::make_template(const std::st
   drop_trial();
   const Reply reply = worker_.request(Command::make_template, 0, 0, specification_json);
   if (reply.kind == ReplyKind::child_died)
-    throw UserError(fmt::format("volume element: its preparation ended with {}; see the log for its last output",
+    throw UserError(fmt::format("volume element: its preparation ended with {} by itself, its output is above; see what its script or its contact law does",
                                 describe_wait_status(reply.value)));
   const std::string mail = worker_.mail(reply);
   const auto state_size = static_cast<std::size_t>(reply.value);
@@ -187,6 +187,10 @@ void PythonVolumeElements::read(std::size_t index, const Plan& plan, Operator wa
     return fail("it has lost all its contacts: no stress, no unbalanced force",
                 "It can carry no tension: keep it under pressure, give it ve.cohesion, or try a smaller load step.");
   const double unbalanced = response.report["unbalanced_force"];
+  if (!(unbalanced <= options_.max_unbalanced_force) && slot.steps == 0)
+    return fail(fmt::format("unbalanced force {:.1e} without any strain, limit {:.1e}", unbalanced,
+                            options_.max_unbalanced_force),
+                "The state that it starts from is not at rest: let the scene come to rest before it is adopted.");
   if (!(unbalanced <= options_.max_unbalanced_force))
     return fail(fmt::format("unbalanced force {:.1e} after {} steps, limit {:.1e}", unbalanced, slot.steps,
                             options_.max_unbalanced_force),

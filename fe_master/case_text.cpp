@@ -173,14 +173,16 @@ std::string describe_parameters() {
   return out;
 }
 
-std::string case_hash(const Case& c) {
+std::string comparable_toml(const Case& c) {
   Case placeless = c;
   placeless.output = {};
   placeless.mesh.file = hash(contents(c.mesh.file));
   forget_places(placeless.ve);
   for (RegionVe& region : placeless.ve_regions) forget_places(region.ve);
-  return hash(effective_toml(placeless));
+  return effective_toml(placeless);
 }
+
+std::string case_hash(const Case& c) { return hash(comparable_toml(c)); }
 
 std::string ve_spec_json(const VeParameters& ve) {
   std::string out;

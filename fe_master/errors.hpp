@@ -9,4 +9,9 @@ struct UserError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A file could not be written: its text is one sentence with the file and the system's reason; status 5.
+struct DiskError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 }  // namespace femxdem

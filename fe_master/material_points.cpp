@@ -18,4 +18,9 @@ double& PointReport::operator[](std::string_view field) { return values[report_i
 
 double PointReport::operator[](std::string_view field) const { return values[report_index(field)]; }
 
+std::string describe(const Failure& failure) {
+  const bool stops = failure.sentence.empty() || failure.sentence.back() == '.';
+  return failure.sentence + (stops ? " " : ". ") + failure.advice;
+}
+
 }  // namespace femxdem

@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <array>
-#include <fstream>
-#include <stdexcept>
+#include <cerrno>
+#include <cstring>
 #include <system_error>
 
 #include "errors.hpp"
@@ -24,16 +24,18 @@ void remove_results(const fs::path& folder) {
 
 }  // namespace
 
-void prepare_output_folder(const fs::path& folder, Existing existing) {
-  std::error_code error;
+std::unique_ptr<FolderLock> prepare_output_folder(const fs::path& folder, Existing existing) {
+  std::error_code error, cannot_ask;
   fs::create_directories(folder, error);
-  if (!fs::is_directory(folder)) {
+  if (!fs::is_directory(folder, cannot_ask)) {
     throw UserError(fmt::format("{}: cannot be made a folder ({}); choose another --out", folder.string(),
                                 error ? error.message() : "a file of that name exists"));
   }
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw UserError(fmt::format("{}: the folder cannot be written; choose another --out", folder.string()));
+    throw UserError(fmt::format("{}: the folder cannot be written ({}); choose another --out", folder.string(),
+                                std::strerror(errno)));
   }
+  auto lock = std::make_unique<FolderLock>(folder);
   if (existing == Existing::overwrite) remove_results(folder);
   const bool holds_results = fs::exists(folder / "history.csv") || fs::exists(folder / "results.h5");
   if (existing == Existing::refuse && holds_results) {
@@ -42,16 +44,7 @@ void prepare_output_folder(const fs::path& folder, Existing existing) {
                     "choose another --out",
                     folder.string()));
   }
-}
-
-void replace_file(const fs::path& file, std::string_view text) {
-  fs::path beside = file;
-  beside += ".new";
-  std::ofstream stream(beside, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written; is the disk full?", beside.string()));
-  fs::rename(beside, file);
+  return lock;
 }
 
 }  // namespace femxdem

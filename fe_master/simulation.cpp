@@ -14,6 +14,7 @@
 #include "log.hpp"
 #include "monitors.hpp"
 #include "point_fields.hpp"
+#include "restart.hpp"
 #include "results.hpp"
 #include "second_gradient_q8.hpp"
 #include "solve_step.hpp"
@@ -37,6 +38,7 @@ class Run {
   void write_fields();
   void write_state();
   void finish(int status, const std::string& message);
+  std::string stopped_by_the_disk(const std::string& reason);
   std::string place(std::size_t point) const;
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
@@ -44,7 +46,7 @@ class Run {
   const RunOptions& options_;
   MaterialPoints& points_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  bool prepared_;  // the folder, before any file in it
+  std::shared_ptr<FolderLock> lock_;  // of the folder, before any file in it
   Checkpoint resumed_;
   Log log_;
   std::unique_ptr<Element> element_;
@@ -58,15 +60,15 @@ class Run {
   Summary summary_;
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
+  int last_checkpoint_ = 0;  ///< step of the one on the disk, 0: none
 };
 
 /// A step that would leave less than half of itself is half of what is left: a tiny last step is a hold for the volume
 /// elements, whose stress relaxes in it.
 double without_crumb(double dt, double left) { return left < 1.5 * dt ? 0.5 * left : dt; }
 
-bool prepare(const RunOptions& options) {
-  prepare_output_folder(options.folder, options.existing);
-  return true;
+std::shared_ptr<FolderLock> prepare(const RunOptions& options) {
+  return options.lock ? options.lock : prepare_output_folder(options.folder, options.existing);
 }
 
 std::vector<Point2> positions(const Element& element) {
@@ -77,14 +79,15 @@ std::vector<Point2> positions(const Element& element) {
 
 Checkpoint find_checkpoint(const Case& c, const RunOptions& options) {
   if (options.existing != Existing::resume) return {};
-  return read_checkpoint(options.folder / "checkpoint.h5", case_hash(c), options.versions);
+  const std::filesystem::path file = options.folder / "checkpoint.h5";
+  return read_checkpoint(file, hash_of_restart(file, c), options.versions);
 }
 
 Run::Run(const Case& c, const Mesh& mesh, MaterialPoints& points, const RunOptions& options)
     : case_(c),
       options_(options),
       points_(points),
-      prepared_(prepare(options)),
+      lock_(prepare(options)),
       resumed_(find_checkpoint(c, options)),
       log_(options.folder / "log.txt", options.existing),
       element_(make_element(c, mesh)),
@@ -111,6 +114,8 @@ int Run::go() {
                        element_->mesh().elements.size(), points_.size(), element_->unknowns(), options_.ranks,
                        options_.ranks > 1 ? "s" : ""));
   for (const std::string& warning : warnings(case_, element_->mesh())) log_.say("warning: " + warning);
+  if (!lock_->remark().empty()) log_.say(lock_->remark());
+  for (const std::string& remark : options_.remarks) log_.note(remark);
   before_ = solver_.committed();
   if (options_.existing == Existing::resume) {
     restart();
@@ -126,12 +131,28 @@ int Run::go() {
                   ? fmt::format("{} steps to time {:g}", summary_.steps, solver_.committed().time)
                   : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}", summary_.steps,
                                 solver_.committed().time, options_.folder.string(), last_.reason);
+  } catch (const DiskError& error) {
+    throw DiskError(stopped_by_the_disk(error.what()));
   } catch (const std::exception& error) {
     finish(kPointFailed, error.what());
     throw;
   }
   finish(status, message);
   return status;
+}
+
+/// Says what is whole; the summary of how the run ended is written if it still finds a place.
+std::string Run::stopped_by_the_disk(const std::string& reason) {
+  const std::string state = last_checkpoint_ > 0
+                                ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
+                                : "there is no checkpoint to restart from";
+  const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again", reason,
+                                          summary_.steps, solver_.committed().time, state);
+  try {
+    finish(kNotWritten, message);
+  } catch (const DiskError&) {  // the same disk
+  }
+  return message;
 }
 
 int Run::advance() {
@@ -254,13 +275,15 @@ void Run::write_fields() {
 }
 
 void Run::write_state() {
-  Checkpoint checkpoint{summary_.steps, solver_.committed().time, dt_, {}, {}, summary_.case_hash, options_.versions};
+  Checkpoint checkpoint{summary_.steps, solver_.committed().time, dt_, {}, {}, summary_.case_hash, options_.versions,
+                        comparable_toml(case_)};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back("run.counts",
                                  std::vector<double>{static_cast<double>(summary_.evaluations), summary_.dem_steps});
   checkpoint.states = points_.save();
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
+  last_checkpoint_ = summary_.steps;
   log_.note(fmt::format("checkpoint after step {}", summary_.steps));
 }
 
@@ -270,6 +293,7 @@ void Run::restart() {
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
   dt_ = resumed_.dt;
+  last_checkpoint_ = resumed_.step;
   summary_.steps = resumed_.step;
   summary_.evaluations = static_cast<long>(resumed_.array("run.counts").at(0));
   summary_.dem_steps = resumed_.array("run.counts").at(1);

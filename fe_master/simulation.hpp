@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "analytic_laws.hpp"
 #include "case.hpp"
@@ -22,6 +23,7 @@ enum ExitStatus : int {
   kBadInput = 2,
   kNotConverged = 3,  ///< every converged step is on the disk
   kPointFailed = 4,   ///< a volume element failed and smaller steps did not help
+  kNotWritten = 5,    ///< a file could not be written: disk full, quota
 };
 
 /// Where and how a case is run.
@@ -31,6 +33,8 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
+  std::vector<std::string> remarks;  ///< on the material points, for log.txt: what was adopted, dropped, reset
+  std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 

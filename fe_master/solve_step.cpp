@@ -34,7 +34,7 @@ std::vector<Response> undeformed(MaterialPoints& points, std::span<const Tensor2
   points.begin_step();
   std::vector<Response> responses = points.evaluate(F, Operator::elastic);
   for (const Response& r : responses) {
-    if (r.failure) throw UserError(r.failure->sentence + " " + r.failure->advice);
+    if (r.failure) throw UserError(describe(*r.failure));
   }
   return responses;
 }

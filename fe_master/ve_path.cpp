@@ -68,6 +68,7 @@ class Path {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   SolverParameters parameters_;
   PathDriver driver_;
+  std::shared_ptr<FolderLock> lock_;  // of the folder, before any file in it
   Log log_;
   History history_;
   Summary summary_;
@@ -76,9 +77,8 @@ class Path {
   double last_noise_ = 0, largest_noise_ = 0;
 };
 
-const std::filesystem::path& prepared(const RunOptions& options) {
-  prepare_output_folder(options.folder, options.existing);
-  return options.folder;
+std::shared_ptr<FolderLock> prepared(const RunOptions& options) {
+  return options.lock ? options.lock : prepare_output_folder(options.folder, options.existing);
 }
 
 Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples)
@@ -87,7 +87,8 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
       noise_samples_(noise_samples),
       parameters_(with_default_tolerances(c.solver, c.material.type == MaterialType::volume_element)),
       driver_(point, parameters_),
-      log_(prepared(options) / "log.txt", options.existing),
+      lock_(prepared(options)),
+      log_(options.folder / "log.txt", options.existing),
       history_(options.folder / "history.csv", columns(noise_samples > 0), options.existing) {
   replace_file(options.folder / "case.toml", effective_toml(c));
   summary_.case_hash = case_hash(c);
@@ -98,6 +99,8 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
 int Path::go() {
   log_.say(fmt::format("{}: one material point, {} segment{}", case_.file, case_.path.size(),
                        case_.path.size() > 1 ? "s" : ""));
+  if (!lock_->remark().empty()) log_.say(lock_->remark());
+  for (const std::string& remark : options_.remarks) log_.note(remark);
   record_row();
   try {
     for (std::size_t s = 0; s < case_.path.size(); ++s) {
@@ -107,6 +110,8 @@ int Path::go() {
                                 summary_.steps, 100 * (record_.time - static_cast<double>(s)), s + 1,
                                 options_.folder.string(), last_.reason));
     }
+  } catch (const DiskError& error) {
+    throw DiskError(fmt::format("{}; the last whole step is {}; make room and start again", error.what(), summary_.steps));
   } catch (const std::exception& error) {
     finish(kPointFailed, error.what());
     throw;
