@@ -61,6 +61,8 @@ class Run {
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
   int last_checkpoint_ = 0;  ///< step of the one on the disk, 0: none
+  int whole_step_ = 0;       ///< the last one of which every file has what it should
+  double whole_time_ = 0;
 };
 
 /// A step that would leave less than half of itself is half of what is left: a tiny last step is a hold for the volume
@@ -121,11 +123,11 @@ int Run::go() {
     restart();
   } else {
     log_.say(fmt::format("start: out-of-balance force {:.1e} of the loads", solver_.relative_residual(before_)));
-    write_fields();
   }
   int status = kNotConverged;
   std::string message;
   try {
+    if (options_.existing != Existing::resume) write_fields();
     status = advance();
     message = status == kDone
                   ? fmt::format("{} steps to time {:g}", summary_.steps, solver_.committed().time)
@@ -147,7 +149,7 @@ std::string Run::stopped_by_the_disk(const std::string& reason) {
                                 ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
                                 : "there is no checkpoint to restart from";
   const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again", reason,
-                                          summary_.steps, solver_.committed().time, state);
+                                          whole_step_, whole_time_, state);
   try {
     finish(kNotWritten, message);
   } catch (const DiskError&) {  // the same disk
@@ -219,6 +221,8 @@ bool Run::step() {
   record_ = {};
   summary_.steps = step;
   if (step % case_.output.every == 0) write_fields();
+  whole_step_ = step;
+  whole_time_ = solver_.committed().time;
   if (case_.output.checkpoint_every > 0 && step % case_.output.checkpoint_every == 0) write_state();
   return true;
 }
@@ -293,7 +297,8 @@ void Run::restart() {
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
   dt_ = resumed_.dt;
-  last_checkpoint_ = resumed_.step;
+  last_checkpoint_ = whole_step_ = resumed_.step;
+  whole_time_ = resumed_.time;
   summary_.steps = resumed_.step;
   summary_.evaluations = static_cast<long>(resumed_.array("run.counts").at(0));
   summary_.dem_steps = resumed_.array("run.counts").at(1);
@@ -353,7 +358,13 @@ std::unique_ptr<MaterialPoints> make_analytic_points(const Case& c, const Mesh& 
 }
 
 int run_simulation(const Case& c, const Mesh& mesh, MaterialPoints& points, const RunOptions& options) {
-  return Run(c, mesh, points, options).go();
+  std::unique_ptr<Run> run;
+  try {
+    run = std::make_unique<Run>(c, mesh, points, options);
+  } catch (const DiskError& error) {
+    throw DiskError(fmt::format("{}; no step has been made; make room and start again", error.what()));
+  }
+  return run->go();
 }
 
 }  // namespace femxdem

@@ -66,7 +66,7 @@ def close_windows():
     qt.__path__ = []
     yade.qt = qt
     for name in ("_GLViewer", "Inspector", "SerializableEditor", "ui_controller"):
-        setattr(qt, name, _module(f"yade.qt.{name}", {}))
+        _module(f"yade.qt.{name}", {})
     yade._qt = _module("yade._qt", {})
 
 

@@ -52,15 +52,16 @@ def _largest_eigenvalue(O, own):
     mass = np.array([[b.state.mass] for b in grains])
     inertia = np.array([[b.state.inertia[0]] for b in grains])
     zero = np.zeros((len(grains), 3))
-    f0, t0 = _forces(O, grains, rest, zero, zero)
+    _forces(O, grains, rest, zero, zero)
     scale = _mean_force(O)
     rng = np.random.default_rng(0)
     v, w = rng.standard_normal((2, len(grains), 3))
     w /= np.sqrt(inertia / mass)
-    size, largest = 1e-6 * float(np.cbrt(O.cell.volume / len(grains))) / own, 0.0
+    size, largest = 1e-9 * float(np.cbrt(O.cell.volume / len(grains))) / own, 0.0
     for _ in range(ITERATIONS):
         norm = np.sqrt((v * v).sum() / len(grains))
         v, w = v / norm, w / norm
+        f0, t0 = _forces(O, grains, rest, zero, zero)  # again: a probe may have let a contact slip
         f, t = _forces(O, grains, rest, size * v, size * w)
         force, torque = (f0 - f) / size, (t0 - t) / size
         answer = np.sqrt((force * force).sum() / len(grains)) * size / scale
