@@ -37,6 +37,21 @@ def drives(O, engine):
     return engine.dead or type(engine).__name__ in _with_derived(O, bases)
 
 
+def finish_step(O):
+    """Ends the step in which an error or an exit of a hook, or substepping, has left the scene: its other engines do nothing."""
+    O.subStepping = False
+    if O.subStep < 0:
+        return
+    alive = [e for e in O.engines if not e.dead]
+    time_step, O.dt = O.dt, 0.0
+    for engine in alive:
+        engine.dead = True
+    O.step()
+    for engine in alive:
+        engine.dead = False
+    O.dt = time_step
+
+
 def _with_derived(O, bases):
     return {name for base in bases for name in (base, *_derived(O, base))}
 
@@ -91,6 +106,7 @@ def _refuse_unsuitable(O, names):
         if not b.dynamic and not b.isClumpMember:
             raise ValueError(f"Body {b.id} of the YADE scene is held (dynamic is False): every grain must be free.")
     _refuse_partly_held(O)
+    _refuse_partly_moved(O)
     _refuse_permanent_forces(O)
     if O.interactions.countReal() == 0:
         raise ValueError("The YADE scene has no contacts: a volume element must carry a stress.")
@@ -113,6 +129,17 @@ def _refuse_partly_held(O):
     if "xyz" in held:
         raise ValueError(
             'All grains of the YADE scene have their translations blocked (blockedDOFs holds "xyz"): they must be free.'
+        )
+
+
+def _refuse_partly_moved(O):
+    """NewtonIntegrator.mask leaves bodies of other groups where they are."""
+    mask = next(e for e in O.engines if type(e).__name__ == "NewtonIntegrator").mask
+    left = [b.id for b in O.bodies if mask > 0 and not b.mask & mask]
+    if left:
+        raise ValueError(
+            f"The integrator of the YADE scene moves only bodies of its mask {mask}, so not {len(left)} bodies, body {left[0]} "
+            "among them: a volume element's grains must all be free; set its mask to 0 at the end of the script."
         )
 
 
@@ -154,6 +181,9 @@ def _reset(O, integrator):
     if O.cell.trsf != Matrix3.Identity:
         done.append("deformation gradient of the cell set to the identity")
         O.cell.trsf = Matrix3.Identity
+    if integrator.densityScaling:
+        done.append("density scaling of the integrator turned off")
+        integrator.densityScaling = False
     if integrator.gravity != Vector3.Zero:
         done.append("gravity set to zero")
         integrator.gravity = Vector3.Zero

@@ -86,11 +86,7 @@ def _go_on(O, to_forces, time_step, L, steps, at_rest):
     from yade.utils import Matrix3
 
     O.engines = [e for e in O.engines if not adoption.drives(O, e)]
-    O.subStepping = False
     O.cell.velGrad = Matrix3.Zero
-    if O.subStep >= 0:
-        O.dt = contact_laws.resting_time_step(O)
-        O.step()  # a hook left it within a step
     O.stopAtIter, O.stopAtTime = 0, 0.0
     if at_rest:
         O.dt = contact_laws.resting_time_step(O)

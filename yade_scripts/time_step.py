@@ -3,6 +3,7 @@
 import numpy as np
 
 import contact_laws
+import rolling
 import viscosity
 from contact_loop import contacts, has_stiffness, values
 
@@ -45,7 +46,8 @@ def follow_network(O):
 
 
 def critical_time_step(O, c):
-    """2/omega_max [s] of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin.
+    """2/omega_max [s] of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin, with the rolling
+    and twisting stiffnesses that it may have.
 
     Power iteration on M^-1 K; K holds kn along the normal and kt across it, acting on
     u_j - u_i - (r_i theta_i + r_j theta_j) x n. Its estimate of omega_max comes from below, within some per cent.
@@ -54,6 +56,7 @@ def critical_time_step(O, c):
     i, j = c.ids.T
     n, kn, kt = c.normal, values(c, "kn")[:, None], values(c, "ks")[:, None]
     ri, rj = radius[i][:, None], radius[j][:, None]
+    turning = rolling.stiffness(c)
     rng = np.random.default_rng(0)
     u, w = rng.standard_normal((2, len(mass), 3))
     omega2 = 0.0
@@ -64,6 +67,9 @@ def critical_time_step(O, c):
         t = _cross(n, f)
         force = _sums(np.concatenate([j, i]), np.concatenate([f, -f]), len(mass))
         torque = _sums(np.concatenate([i, j]), np.concatenate([-ri * t, -rj * t]), len(mass))
+        if turning:  # K of the moments: torques oppose as forces do, with the sign of `force` here
+            m = rolling.moments(c, turning, w)
+            torque = torque + _sums(np.concatenate([j, i]), np.concatenate([m, -m]), len(mass))
         energy = (u * force).sum() + (w * torque).sum()  # 2 x potential, over 2 x kinetic: Rayleigh's quotient
         omega2 = energy / ((mass[:, None] * u * u).sum() + (inertia[:, None] * w * w).sum())
         u, w = force / mass[:, None], torque / inertia[:, None]

@@ -81,6 +81,7 @@ class Engine:
         spec = {**DEFAULTS, **spec}
         notes, inputs = self._make_scene(spec)
         manifest = {"source": spec["source"], "notes": notes, "inputs": sorted(inputs.items())}
+        adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
         own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
         try:
