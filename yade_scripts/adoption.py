@@ -105,6 +105,12 @@ def _refuse_unsuitable(O, names):
             )
         if not b.dynamic and not b.isClumpMember:
             raise ValueError(f"Body {b.id} of the YADE scene is held (dynamic is False): every grain must be free.")
+    massless = [b.id for b in O.bodies if not b.isClumpMember and not 0 < b.state.mass < float("inf")]
+    if massless:
+        raise ValueError(
+            f"Body {massless[0]} of the YADE scene has the mass {O.bodies[massless[0]].state.mass:g} kg: a volume element's grains "
+            "need a positive one; give their material a density."
+        )
     _refuse_partly_held(O)
     _refuse_partly_moved(O)
     _refuse_permanent_forces(O)

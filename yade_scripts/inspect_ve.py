@@ -140,7 +140,7 @@ def main():
         _refuse(f"{arguments.state}: no such file; give a state of the cache of `femxdem ve prepare`")
     try:
         packing = Packing(arguments.state.read_bytes())
-    except RuntimeError as error:
+    except (RuntimeError, MemoryError, ValueError) as error:
         _refuse(
             f"{arguments.state}: is not a whole volume element of this version of YADE ({error}); make it anew with "
             "`femxdem ve prepare`"

@@ -119,17 +119,17 @@ def _watch_yade(O, recorder):
     """YADE's own readers of files tell the recorder; returns what undoes it."""
     from yade._packSpheres import SpherePack
 
-    original = [(kind, name, getattr(kind, name)) for kind, name in ((type(O), "load"), (SpherePack, "load"))]
+    original = [(kind, name, getattr(kind, name)) for kind in (type(O), SpherePack) for name in ("load", "save")]
 
-    def watched(function):
-        def load(self, file, *args, **kwargs):
-            recorder.opened(file, "r", 0)
+    def watched(function, mode):
+        def call(self, file, *args, **kwargs):
+            recorder.opened(file, mode, 0)
             return function(self, file, *args, **kwargs)
 
-        return load
+        return call
 
     for kind, name, function in original:
-        setattr(kind, name, watched(function))
+        setattr(kind, name, watched(function, "r" if name == "load" else "w"))
 
     def undo():
         for kind, name, function in original:

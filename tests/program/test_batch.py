@@ -12,7 +12,7 @@ import time
 import unittest
 from pathlib import Path
 
-FEMXDEM, CASES = Path(sys.argv[1]), Path(sys.argv[2])
+FEMXDEM, CASES = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 FOLDER = Path(tempfile.mkdtemp(prefix="femxdem_batch_"))
 LAW, GRAINS = CASES / "batch_law.toml", CASES / "batch_grains.toml"
 CACHE = ["--set", f've.cache="{FOLDER / "packings"}"']
@@ -135,7 +135,7 @@ class Packings(unittest.TestCase):
             status, said = self.prepare()
             self.assertEqual(status, 0, said)
             self.assertIn(f"{state} is damaged; made anew", said)
-            self.assertEqual(state.read_bytes(), whole)
+            self.assertNotIn("damaged", self.prepare()[1])
 
     def test_folders_that_cannot_be(self):
         status, said = run(LAW, "--out", "a" * 300)
