@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -95,14 +97,14 @@ Cached look_up(const TemplateFiles& files) {
 }
 
 void store(const TemplateFiles& files, const PythonVolumeElements::Template& made) {
-  try {
-    fs::create_directories(files.state.parent_path());
-    replace_file(files.manifest, made.manifest);
-    replace_file(files.state, made.state);
-  } catch (const std::runtime_error& error) {
-    throw UserError(fmt::format("the packing cannot be stored: {}; give another ve.cache, a folder that can be written",
-                                error.what()));
-  }
+  const fs::path folder = files.state.parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || access(folder.c_str(), W_OK | X_OK) != 0)
+    throw UserError(fmt::format("the packing cannot be stored in {} ({}); give another ve.cache, a folder that can be written",
+                                folder.string(), error ? error.message() : std::strerror(errno)));
+  replace_file(files.manifest, made.manifest);
+  replace_file(files.state, made.state);
 }
 
 }  // namespace

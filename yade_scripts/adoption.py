@@ -187,9 +187,11 @@ def _reset(O, integrator):
     if O.cell.trsf != Matrix3.Identity:
         done.append("deformation gradient of the cell set to the identity")
         O.cell.trsf = Matrix3.Identity
-    if integrator.densityScaling:
-        done.append("density scaling of the integrator turned off")
-        integrator.densityScaling = False
+    scaled = [b for b in O.bodies if b.state.densityScaling not in (1.0, -1.0)]  # YADE saves it, but not its use
+    if scaled:
+        done.append(f"density scaling of {len(scaled)} bodies taken off")
+        for b in scaled:
+            b.state.densityScaling = 1.0
     if integrator.gravity != Vector3.Zero:
         done.append("gravity set to zero")
         integrator.gravity = Vector3.Zero

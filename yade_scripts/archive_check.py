@@ -86,12 +86,34 @@ def refuse_not_finite(O, when):
 
 def refuse_lost_grains(O):
     """Raises ValueError where a grain's position is not a number: the simulation has diverged."""
+    if not len(O.bodies):
+        raise ValueError("The YADE scene has no bodies: a volume element is made of grains.")
     lost = [b.id for b in O.bodies if not np.isfinite(b.state.pos).all()]
     if lost:
         raise ValueError(
             f"The positions of {len(lost)} bodies of the YADE scene, body {lost[0]} among them, are not numbers: its "
             "simulation has diverged; lower O.dt in the script."
         )
+
+
+UNREST = 0.2  # unbalanced force of a scene that is not one in equilibrium
+LOUD = 0.02  # a change by which adoption is to be read about: grains that go on moving for a step change less
+
+
+def notes_on_adoption(left, made, dropped):
+    """Sentences where the State `made` by adoption is not the one that the script `left` behind: its engines did more than
+    strain and watch."""
+    if left is None:
+        return []
+    found = differences(left, made)
+    loud = [f"{what} {found[what]:.1e}" for what in ("stress", "normal forces", "shear forces", "unbalanced force")
+            if not found[what] <= LOUD]
+    if not loud:
+        return []
+    return [
+        f"adoption itself changed the scene: {', '.join(loud)}; unbalanced force {left.unbalanced:.1e} as the script left it, "
+        f"{made.unbalanced:.1e} now: forces of what was dropped ({', '.join(dropped) or 'nothing'}) are missing"
+    ]
 
 
 def refuse_dropped(before, after, O, when):
@@ -104,6 +126,12 @@ def refuse_dropped(before, after, O, when):
     ]
     if not parts:
         return
+    if before.unbalanced > UNREST:
+        raise ValueError(
+            f"The YADE scene is not at rest (unbalanced force {before.unbalanced:.1e}), so that it differs from itself when it is "
+            f"saved and restored, in {', '.join(parts)}: let it come to rest before its script ends, as by running until "
+            "unbalancedForce() < 0.01; if it does not, lower O.dt."
+        )
     raise ValueError(
         f"YADE's archive does not keep the whole state of this scene (contact law {law_names(O)}): saved and restored "
         f"{when}, it differs in {', '.join(parts)} (relative, limit {TOLERANCE:.0e}; unbalanced force {before.unbalanced:.1e} "

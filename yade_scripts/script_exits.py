@@ -4,6 +4,7 @@ import builtins
 import os
 import signal
 import sys
+import threading
 
 
 class Left(BaseException):
@@ -18,18 +19,22 @@ def catch_exits(O):
     def leave(*args, **kwargs):
         raise Left
 
+    def leave_politely(status=None):
+        """As Python's own in the script, whose `except SystemExit` may want it; hooks run in a thread of YADE's."""
+        raise SystemExit(status) if threading.current_thread() is threading.main_thread() else Left
+
     def kill(pid, number):
         if pid in (0, os.getpid()) and number != 0:
             raise Left
         return original_kill(pid, number)
 
     original_kill = os.kill
-    places = [(sys, "exit"), (os, "_exit"), (os, "abort"), (signal, "raise_signal"), (type(O), "exitNoBacktrace")]
-    places += [(builtins, name) for name in ("exit", "quit")]
+    polite = [(sys, "exit"), (builtins, "exit"), (builtins, "quit")]
+    places = [(os, "_exit"), (os, "abort"), (signal, "raise_signal"), (type(O), "exitNoBacktrace")]
     places += [(os, name) for name in dir(os) if name.startswith("exec")]
-    original = [(place, name, getattr(place, name, None)) for place, name in places]
-    for place, name in places:
-        setattr(place, name, leave)
+    original = [(place, name, getattr(place, name, None)) for place, name in polite + places]
+    for place, name in polite + places:
+        setattr(place, name, leave_politely if (place, name) in polite else leave)
     os.kill = kill
 
     def undo():

@@ -94,6 +94,9 @@ def drop_nothings(O):
 
     def assign(self, given):
         real = [e for e in given if not isinstance(e, Nothing)]
+        for engine in real:
+            if type(engine).__name__ == "SnapshotEngine":
+                engine.dead = True  # it wants a window
         undo.dropped += len(list(given)) - len(real)
         engines.__set__(self, real)
 

@@ -67,7 +67,7 @@ def run_script(O, path, arguments, steps, seconds):
             pass
         except _TimeUp:
             notes.append(f"the script's simulation was stopped after {seconds:g} s")
-        except (Exception, SystemExit, Left) as error:
+        except (Exception, KeyboardInterrupt, SystemExit, Left) as error:
             if not left(error):
                 raise _failure(path, error) from error
             in_hook = not isinstance(error, (Left, SystemExit))

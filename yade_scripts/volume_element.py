@@ -83,6 +83,7 @@ class Engine:
         manifest = {"source": spec["source"], "notes": notes, "inputs": sorted(inputs.items())}
         adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
+        left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None
         own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
         try:
             manifest.update(adoption.adopt(self.O))
@@ -101,7 +102,7 @@ class Engine:
         state = self.O.sceneToString()
         manifest["state"] = f"{len(state)}-{zlib.crc32(state):08x}"
         manifest["continuation"], said = self._compare(state, made, itself, spec["compare"])
-        notes += said
+        notes += archive_check.notes_on_adoption(left, made, manifest["dropped"]) + said
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
         return {"state": state, "manifest": manifest}

@@ -143,6 +143,21 @@ class Packings(unittest.TestCase):
         status, said = run(GRAINS, "--set", 've.cache="/proc/packings"', program="ve prepare")
         self.assertEqual((status, "the packing cannot be stored" in said), (2, True), said)
 
+    def test_scripts_that_raise_systemexit_in_a_hook_or_are_not_at_rest(self):
+        script = (CASES / "../cases/scripts/triaxial.py").resolve().read_text()
+        places = {
+            "material": "FrictMat(young=5e7, poisson=.4, frictionAngle=radians(20), density=2600)", "bodies": "",
+            "geometry": "Ig2_Sphere_Sphere_ScGeom", "physics": "Ip2_FrictMat_FrictMat_FrictPhys()",
+            "law": "Law2_ScGeom_FrictPhys_CundallStrack()", "step": ".5 * PWaveTimeStep()", "ready": "raise SystemExit(3)",
+            "run": "O.run(60000, True)", "end": ""}
+        case = ["--set", 've.source="script"', "--set", f've.script="{FOLDER / "theirs.py"}"', "--set", "ve.script_steps=70000"]
+        (FOLDER / "theirs.py").write_text(script.format(**places))
+        status, said = self.prepare(*case)
+        self.assertEqual((status, "the script called exit in one of its hooks" in said), (0, True), said)
+        (FOLDER / "theirs.py").write_text(script.format(**{**places, "ready": "O.pause()", "run": "O.run(2000, True)"}))
+        status, said = self.prepare(*case)
+        self.assertEqual((status, "is not at rest as it was made: unbalanced force" in said), (2, True), said)
+
     def test_inspect_wants_a_case_or_a_state(self):
         (FOLDER / "mine.py").write_text("O.periodic = True\n")
         (FOLDER / "bad.state").write_bytes(b"nothing of YADE")
