@@ -74,6 +74,8 @@ def _distance(a, b, name):
 
 def refuse_not_finite(O, when):
     """Raises ValueError, naming the law, where stress, contact forces or cell are not numbers."""
+    if O.interactions.countReal() == 0:
+        raise ValueError(f"The YADE scene has no contacts {when}: a volume element must carry a stress.")
     now = state(O)
     numbers = (now.stress, now.normal, now.shear, np.array(O.cell.hSize), now.unbalanced)
     if all(np.isfinite(x).all() for x in numbers):

@@ -154,7 +154,7 @@ class Packings(unittest.TestCase):
         (FOLDER / "theirs.py").write_text(script.format(**places))
         status, said = self.prepare(*case)
         self.assertEqual((status, "the script called exit in one of its hooks" in said), (0, True), said)
-        (FOLDER / "theirs.py").write_text(script.format(**{**places, "ready": "O.pause()", "run": "O.run(2000, True)"}))
+        (FOLDER / "theirs.py").write_text(script.format(**{**places, "ready": "O.pause()", "run": "O.run(5500, True)"}))
         status, said = self.prepare(*case)
         self.assertEqual((status, "is not at rest as it was made: unbalanced force" in said), (2, True), said)
 

@@ -101,6 +101,13 @@ TEST(MeshFiles, EmptyOrNamelessGroupsAreRefused) {
   EXPECT_EQ(gmsh_mesh(data("without_names.geo")).edges.size(), 0u);
 }
 
+TEST(MeshFiles, ErrorsInAGeometryAreRefused) {
+  for (const char* wrong : {"Plane Surface(1) = {9};", "nonsense(1) = {1};", "Plane Surface(1) = {1}; BooleanFragments{ Surface{1};"}) {
+    const std::string said = refusal(changed("plain.geo", "Plane Surface(1) = {1};", wrong));
+    EXPECT_NE(said.find("Gmsh cannot read it"), std::string::npos) << wrong << ": " << said;
+  }
+}
+
 /// The plate with its upper half in two groups, a corner and a curve in a group of points and in two of curves, as Gmsh
 /// writes it.
 std::string overlapping(double version, bool binary) {
