@@ -27,12 +27,7 @@ struct GmshSession {
     gmsh::option::setNumber("Mesh.ElementOrder", 2);
     gmsh::option::setNumber("Mesh.SecondOrderIncomplete", 1);
   }
-  ~GmshSession() {
-    try {
-      gmsh::finalize();
-    } catch (const std::string&) {  // it says its last error once more
-    }
-  }
+  ~GmshSession() { gmsh::finalize(); }
   GmshSession(const GmshSession&) = delete;
   GmshSession& operator=(const GmshSession&) = delete;
 };
@@ -232,7 +227,11 @@ void generate(const std::string& file) {
   gmsh::option::getNumber("Mesh.Algorithm", algorithm);
   if (algorithm == kQuadFrontal)  // Gmsh 4.8 dies of a segmentation fault in it
     throw UserError(fmt::format("{}: Mesh.Algorithm = 8 is not safe in Gmsh 4.8; choose 5 or 6 and recombine", file));
+  gmsh::option::setNumber("General.AbortOnError", 1);  // it throws within functions that must not throw
   gmsh::model::mesh::generate(2);
+  std::string error;
+  gmsh::logger::getLastError(error);
+  if (!error.empty()) throw error;  // as the rest of Gmsh does
 }
 
 }  // namespace

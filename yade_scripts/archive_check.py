@@ -128,16 +128,13 @@ def refuse_dropped(before, after, O, when):
     ]
     if not parts:
         return
+    hint = "use another law"
     if before.unbalanced > UNREST:
-        raise ValueError(
-            f"The YADE scene is not at rest (unbalanced force {before.unbalanced:.1e}), so that it differs from itself when it is "
-            f"saved and restored, in {', '.join(parts)}: let it come to rest before its script ends, as by running until "
-            "unbalancedForce() < 0.01; if it does not, lower O.dt."
-        )
+        hint += ", or let the scene come to rest before its script ends, as by running until unbalancedForce() < 0.01"
     raise ValueError(
         f"YADE's archive does not keep the whole state of this scene (contact law {law_names(O)}): saved and restored "
         f"{when}, it differs in {', '.join(parts)} (relative, limit {TOLERANCE:.0e}; unbalanced force {before.unbalanced:.1e} "
-        f"before, {after.unbalanced:.1e} after). A volume element is restored from such archives: use another law."
+        f"before, {after.unbalanced:.1e} after). A volume element is restored from such archives: {hint}."
     )
 
 

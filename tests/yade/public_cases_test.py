@@ -100,7 +100,7 @@ class Held(Scripts):
 
 
     def test_what_else_leaves_grains_where_they_are(self):
-        self.refused("moves only bodies of its mask 2, so not 80 bodies", end="newton.mask = 2")
+        self.refused("moves only bodies of its mask 2, so not 80 bodies", end="O.engines[-1].mask = 2")
         self.refused("Body 3 .* has the mass 0 kg", end="O.bodies[3].state.mass = 0")
         made = self.make(end="for b in O.bodies: b.state.densityScaling = .25")
         self.assertIn("density scaling of 80 bodies taken off", made["manifest"]["reset"])
