@@ -137,9 +137,10 @@ int ve_inspect(const VeArguments& arguments) {
   }
   if (!fs::is_regular_file(state)) throw UserError(fmt::format("{}: no such file; correct the path", state.string()));
   if (state.extension() != ".state")
-    throw UserError(fmt::format("{}: neither a case (.toml) nor a prepared volume element (.state); for a script or a scene, "
-                                "give the case that names it",
-                                state.string()));
+    throw UserError(
+        fmt::format("{}: neither a case (.toml) nor a prepared volume element (.state); for a script or a scene, "
+                    "give the case that names it",
+                    state.string()));
   if (folder.empty()) folder = "out" / state.stem();
   const fs::path script = fs::path(FEMXDEM_YADE_SCRIPTS) / "inspect_ve.py";
   return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});

@@ -56,7 +56,8 @@ std::map<std::string, std::string> parse_strings(const std::string& json) {
 }
 
 /// One line on what a manifest says, with its list; nothing where that is empty.
-void say_list(std::string_view title, const std::vector<std::string>& texts, const std::function<void(std::string_view)>& say) {
+void say_list(std::string_view title, const std::vector<std::string>& texts,
+              const std::function<void(std::string_view)>& say) {
   if (!texts.empty()) say(fmt::format("  {}: {}", title, fmt::join(texts, "; ")));
 }
 
@@ -71,11 +72,11 @@ void say_manifest(const std::string& manifest, const std::function<void(std::str
 void refuse_unrest(const std::string& manifest, const VeParameters& ve, const fs::path& file) {
   const double unbalanced = manifest_number(manifest, "unbalanced_force").value_or(0.0);
   if (unbalanced <= ve.max_unbalanced_force) return;
-  throw UserError(fmt::format(
-      "{}: the volume element is not at rest as it was made: unbalanced force {:.1e}, limit {:.1e} "
-      "(ve.max_unbalanced_force); let the scene come to rest before its script ends, as by running until "
-      "unbalancedForce() < 0.01",
-      file.string(), unbalanced, ve.max_unbalanced_force));
+  throw UserError(
+      fmt::format("{}: the volume element is not at rest as it was made: unbalanced force {:.1e}, limit {:.1e} "
+                  "(ve.max_unbalanced_force); let the scene come to rest before its script ends, as by running until "
+                  "unbalancedForce() < 0.01",
+                  file.string(), unbalanced, ve.max_unbalanced_force));
 }
 
 /// State and manifest of the cache where they are whole and of now; else what is wrong with them, empty where they are
@@ -101,15 +102,18 @@ void store(const TemplateFiles& files, const PythonVolumeElements::Template& mad
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || access(folder.c_str(), W_OK | X_OK) != 0)
-    throw UserError(fmt::format("the packing cannot be stored in {} ({}); give another ve.cache, a folder that can be written",
-                                folder.string(), error ? error.message() : std::strerror(errno)));
+    throw UserError(
+        fmt::format("the packing cannot be stored in {} ({}); give another ve.cache, a folder that can be written",
+                    folder.string(), error ? error.message() : std::strerror(errno)));
   replace_file(files.manifest, made.manifest);
   replace_file(files.state, made.state);
 }
 
 }  // namespace
 
-fs::path packings_folder(const VeParameters& ve) { return ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache); }
+fs::path packings_folder(const VeParameters& ve) {
+  return ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
+}
 
 std::string writable_cache(const VeParameters& ve, const fs::path& results) {
   if (!ve.cache.empty() || results.empty()) return ve.cache;

@@ -20,7 +20,7 @@ struct Checkpoint {
   SavedStates states;  ///< committed states of the material points
   std::string case_hash;
   std::map<std::string, std::string> versions;  ///< such as {"yade", "2023.02a"}; the states are readable by these only
-  std::string case_text = {};  ///< comparable_toml of the case, for saying what differs; not read back
+  std::string case_text = {};                   ///< comparable_toml of the case, for saying what differs; not read back
 
   /// Array of that name; throws std::out_of_range where there is none.
   const std::vector<double>& array(const std::string& name) const;

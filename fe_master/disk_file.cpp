@@ -81,8 +81,7 @@ void reserve_space(const fs::path& file, std::uint64_t bytes) {
   if (descriptor < 0) fail(file, errno);
   struct stat found {};
   int reason = fstat(descriptor, &found) == 0 ? 0 : errno;
-  if (reason == 0 &&
-      fallocate(descriptor, FALLOC_FL_KEEP_SIZE, found.st_size, static_cast<off_t>(bytes)) != 0) {
+  if (reason == 0 && fallocate(descriptor, FALLOC_FL_KEEP_SIZE, found.st_size, static_cast<off_t>(bytes)) != 0) {
     reason = errno == EOPNOTSUPP || errno == ENOSYS ? grow_by_zeros(descriptor, found.st_size, bytes) : errno;
   }
   close(descriptor);

@@ -6,8 +6,8 @@
 
 namespace femxdem {
 
-/// A file that text is appended to; every write is with the system when it returns. All throw DiskError with the system's
-/// reason.
+/// A file that text is appended to; every write is with the system when it returns. All throw DiskError with the
+/// system's reason.
 class AppendedFile {
  public:
   /// Without `keep` the file is emptied.
@@ -22,8 +22,8 @@ class AppendedFile {
   int descriptor_;
 };
 
-/// Writes beside `file`, makes sure of the disk and renames: a reader sees the old text or the new one, never half of it,
-/// and the old one stays when the new one cannot be written.
+/// Writes beside `file`, makes sure of the disk and renames: a reader sees the old text or the new one, never half of
+/// it, and the old one stays when the new one cannot be written.
 void replace_file(const std::filesystem::path& file, std::string_view text);
 
 /// Makes sure that `file`, which exists, can grow by so many bytes: for libraries that do not survive a full disk.

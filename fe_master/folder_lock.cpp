@@ -95,14 +95,17 @@ FolderLock::FolderLock(const fs::path& folder) : file_(fs::absolute(folder) / "r
     const Owner other = read_owner(file_);
     const bool foreign = other.host != me.host;
     if (foreign || !is_over(other)) {
-      const std::string who = other.host.empty() ? "another run" : fmt::format("process {} on {}", other.process, other.host);
-      throw UserError(foreign ? fmt::format("{}: {} writes into this folder, as {} says, and cannot be asked from this host; "
-                                            "if that run has ended, remove that file, else choose another --out",
-                                            folder.string(), who, file_.string())
-                              : fmt::format("{}: {} writes into this folder; wait until it ends or choose another --out",
-                                            folder.string(), who));
+      const std::string who =
+          other.host.empty() ? "another run" : fmt::format("process {} on {}", other.process, other.host);
+      throw UserError(
+          foreign ? fmt::format("{}: {} writes into this folder, as {} says, and cannot be asked from this host; "
+                                "if that run has ended, remove that file, else choose another --out",
+                                folder.string(), who, file_.string())
+                  : fmt::format("{}: {} writes into this folder; wait until it ends or choose another --out",
+                                folder.string(), who));
     }
-    remark_ = fmt::format("{}: taken over from process {}, which ended without leaving it", folder.string(), other.process);
+    remark_ =
+        fmt::format("{}: taken over from process {}, which ended without leaving it", folder.string(), other.process);
     fs::path mine = file_;
     mine += fmt::format(".{}", me.process);
     std::error_code moved;

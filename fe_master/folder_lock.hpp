@@ -5,11 +5,12 @@
 
 namespace femxdem {
 
-/// A folder of results belongs to one run at a time: the file running.lock in it names host, boot, process and its start.
+/// A folder of results belongs to one run at a time: the file running.lock in it names host, boot, process and its
+/// start.
 ///
-/// The lock of a process of this host that has ended (killed, or of before a reboot) is taken over; `remark` then says so.
-/// Throws UserError while the other run lives, or where it is of another host and cannot be asked. The file goes with this
-/// object, and on SIGTERM, SIGINT and SIGHUP.
+/// The lock of a process of this host that has ended (killed, or of before a reboot) is taken over; `remark` then says
+/// so. Throws UserError while the other run lives, or where it is of another host and cannot be asked. The file goes
+/// with this object, and on SIGTERM, SIGINT and SIGHUP.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

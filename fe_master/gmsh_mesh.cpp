@@ -135,7 +135,8 @@ std::string group_name(int dim, int tag, const MshGroups& given, const std::stri
   return name;
 }
 
-/// Whether an element that lies on one of a group's entities is in the group: a file of format 2 says it of each element.
+/// Whether an element that lies on one of a group's entities is in the group: a file of format 2 says it of each
+/// element.
 bool is_in_group(std::size_t element, int group, const MshGroups& given) {
   if (!given.groups) return true;
   const auto entry = given.groups->find(element);
@@ -148,8 +149,8 @@ std::vector<int> group_entities(int dim, int tag) {
   return entities;
 }
 
-/// Sides of a physical curve that are not among `sides` yet are appended: entities and their lines may be listed more than
-/// once.
+/// Sides of a physical curve that are not among `sides` yet are appended: entities and their lines may be listed more
+/// than once.
 void add_sides_of_curve(int group, const std::string& name, const std::string& file, const MshGroups& given,
                         const std::map<std::size_t, int>& number, const std::multimap<int, Side>& all,
                         std::vector<Side>& sides) {
@@ -170,7 +171,8 @@ void add_sides_of_curve(int group, const std::string& name, const std::string& f
 }
 
 /// Elements of the file, each once however often it is listed; the map is from Gmsh's tag to our number.
-std::map<std::size_t, int> read_elements(const ElementBlock& quads, const std::map<std::size_t, int>& number, Mesh& mesh) {
+std::map<std::size_t, int> read_elements(const ElementBlock& quads, const std::map<std::size_t, int>& number,
+                                         Mesh& mesh) {
   std::map<std::size_t, int> element_number;
   std::map<std::array<int, 8>, int> known;
   for (std::size_t q = 0; q < quads.tags.size(); ++q) {
@@ -189,9 +191,10 @@ Mesh read_model(const std::string& file) {
   Mesh mesh;
   const ElementBlock quads = elements_of_type(kQuad8, 2, -1, file);
   if (quads.tags.empty())
-    throw UserError(fmt::format("{}: no surface elements; mesh the surfaces with 8-node quadrilaterals, and where there are "
-                                "physical curves give the surfaces a Physical Surface(\"name\") too, or Gmsh does not save them",
-                                file));
+    throw UserError(
+        fmt::format("{}: no surface elements; mesh the surfaces with 8-node quadrilaterals, and where there are "
+                    "physical curves give the surfaces a Physical Surface(\"name\") too, or Gmsh does not save them",
+                    file));
   const MshGroups given = read_msh_groups(file);
   const std::map<std::size_t, int> number = read_nodes(quads, file, mesh);
   const std::map<std::size_t, int> element_number = read_elements(quads, number, mesh);
@@ -215,7 +218,8 @@ Mesh read_model(const std::string& file) {
   }
   for (auto& [name, edge] : mesh.edges) {
     if (edge.empty())
-      throw UserError(fmt::format("{}: physical curve '{}' has no lines; mesh the curve, or remove the group", file, name));
+      throw UserError(
+          fmt::format("{}: physical curve '{}' has no lines; mesh the curve, or remove the group", file, name));
     edge = in_order(edge);
   }
   return mesh;

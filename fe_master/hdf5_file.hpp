@@ -17,9 +17,9 @@ struct Hdf5Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An HDF5 file, open as long as the object lives. A failure to read is an Hdf5Error that names file and data set, one to
-/// write a DiskError with the system's reason; HDF5 does not survive a full disk, so space is reserved before.
-/// Paths inside the file start with '/'; missing groups on the way are made.
+/// An HDF5 file, open as long as the object lives. A failure to read is an Hdf5Error that names file and data set, one
+/// to write a DiskError with the system's reason; HDF5 does not survive a full disk, so space is reserved before. Paths
+/// inside the file start with '/'; missing groups on the way are made.
 class Hdf5File {
  public:
   enum class Mode { create, read, update };  ///< create truncates; read and update want an existing file

@@ -9,8 +9,8 @@
 namespace femxdem {
 namespace {
 
-/// Whether a line of progress can be written over. Under mpirun, standard output is a terminal of mpirun's own, whose text
-/// goes who knows where; a scheduler's job writes to a file.
+/// Whether a line of progress can be written over. Under mpirun, standard output is a terminal of mpirun's own, whose
+/// text goes who knows where; a scheduler's job writes to a file.
 bool shows_updates(std::FILE* terminal) {
   for (const char* batch : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_JOB_ID", "PBS_JOBID", "LSB_JOBID", "JOB_ID"})
     if (std::getenv(batch) != nullptr) return false;

@@ -24,7 +24,8 @@ struct IterationRecord {
 };
 
 /// What the run says: everything goes to log.txt, the essential also to the terminal. A terminal shows the progress on
-/// one line that updates; a batch log gets one plain line for each step. Throws DiskError where log.txt cannot be written.
+/// one line that updates; a batch log gets one plain line for each step. Throws DiskError where log.txt cannot be
+/// written.
 class Log {
  public:
   /// With Existing::resume the text of the earlier run is kept.

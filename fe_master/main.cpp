@@ -157,7 +157,7 @@ int check(const Arguments& arguments) {
 int main(int argc, char** argv) {
   using namespace femxdem;
   keep_standard_descriptors();
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is an error of write
+  std::signal(SIGXFSZ, SIG_IGN);                                         // a limit on files' sizes is an error of write
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
   Arguments arguments;
   for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
@@ -197,9 +197,10 @@ int main(int argc, char** argv) {
   add_case(prepare_command);
   prepare_command->add_option("--out", arguments.folder, "Folder of the packings (default: ve.cache, else packings)");
   prepare_command
-      ->add_option("--compare", arguments.compare,
-                   "Make them anew, each beside so many DEM steps of the scene's own continuation in YADE; the manifest and "
-                   "the notes tell the difference")
+      ->add_option(
+          "--compare", arguments.compare,
+          "Make them anew, each beside so many DEM steps of the scene's own continuation in YADE; the manifest and "
+          "the notes tell the difference")
       ->check(CLI::Range(1, 1000000));
   CLI::App* inspect_command =
       ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");

@@ -55,13 +55,14 @@ void refuse_hanging_nodes(const Mesh& mesh, const std::string& file) {
     for (int k = 4; k < 8; ++k) {
       const Point2& x = mesh.nodes[e[k]];
       if (corner[e[k]])
-        throw UserError(
-            fmt::format("{}: the node at ({:.4g}, {:.4g}) is a corner of one element and in the middle of another's side; make "
-                        "the two meshes meet side by side",
-                        file, x.x(), x.y()));
-      if (++uses[e[k]] > 2)
         throw UserError(fmt::format(
-            "{}: the side at ({:.4g}, {:.4g}) belongs to three elements; remove surfaces that overlap", file, x.x(), x.y()));
+            "{}: the node at ({:.4g}, {:.4g}) is a corner of one element and in the middle of another's side; make "
+            "the two meshes meet side by side",
+            file, x.x(), x.y()));
+      if (++uses[e[k]] > 2)
+        throw UserError(
+            fmt::format("{}: the side at ({:.4g}, {:.4g}) belongs to three elements; remove surfaces that overlap",
+                        file, x.x(), x.y()));
     }
   }
 }
@@ -73,7 +74,8 @@ void refuse_gaps(const Mesh& mesh, const std::string& file) {
   if (!pairs.empty()) {
     const Point2& x = mesh.nodes[pairs.front().first];
     throw UserError(fmt::format(
-        "{}: {} pairs of nodes lie at one place without being one, the first at ({:.4g}, {:.4g}): parts that touch are not "
+        "{}: {} pairs of nodes lie at one place without being one, the first at ({:.4g}, {:.4g}): parts that touch are "
+        "not "
         "joined; in Gmsh write `Coherence;` (and leave Geometry.AutoCoherence at 1), or `Coherence Mesh;` for a mesh",
         file, pairs.size(), x.x(), x.y()));
   }

@@ -12,8 +12,8 @@ namespace {
 using Groups = std::map<std::size_t, std::set<int>>;
 
 /// Nodes of Gmsh's element types 1 to 31 (reference manual, "Low order elements" and the rest), 0: not there.
-constexpr int kNodes[] = {0,  2,  3,  4,  4,  8,  6,  5,  3,  6,  9,  10, 27, 18, 14, 1,
-                          8,  20, 15, 13, 9,  10, 12, 15, 15, 21, 4,  5,  6,  20, 35, 56};
+constexpr int kNodes[] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
+                          8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
 
 /// Names between $PhysicalNames and its end: text in files of every kind.
 void read_names(std::istream& stream, MshGroups& found) {
@@ -42,7 +42,8 @@ Groups read_text_elements(std::istream& stream) {
   return groups;
 }
 
-/// Blocks of (type, elements, tags) and, of each element, its number, tags and nodes; all of them int of `swapped` order.
+/// Blocks of (type, elements, tags) and, of each element, its number, tags and nodes; all of them int of `swapped`
+/// order.
 Groups read_binary_elements(std::istream& stream, bool swapped) {
   Groups groups;
   const auto integer = [&] {

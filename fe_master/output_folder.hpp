@@ -16,8 +16,8 @@ enum class Existing {
 };
 
 /// Makes the folder where it is missing, and its parents, and locks it for as long as the lock lives. Throws UserError
-/// where it cannot be made or written, where another run writes into it, and where it holds results and `existing` refuses
-/// them.
+/// where it cannot be made or written, where another run writes into it, and where it holds results and `existing`
+/// refuses them.
 std::unique_ptr<FolderLock> prepare_output_folder(const std::filesystem::path& folder, Existing existing);
 
 }  // namespace femxdem

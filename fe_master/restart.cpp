@@ -34,7 +34,9 @@ Parameters parameters(const std::string& toml) {
 }
 
 /// Whether a key's value is the hash of a file's contents.
-bool is_file(const std::string& key) { return key.ends_with(".file") || key.ends_with(".script") || key.ends_with(".scene"); }
+bool is_file(const std::string& key) {
+  return key.ends_with(".file") || key.ends_with(".script") || key.ends_with(".scene");
+}
 
 std::string describe(const std::string& key, const Parameters& theirs, const Parameters& ours) {
   if (is_file(key)) return key + " (another content)";
@@ -87,17 +89,20 @@ std::string hash_of_restart(const std::filesystem::path& checkpoint, const Case&
   const std::set<std::string> keys = differing(parameters(text), parameters(ours));
   const std::string where = checkpoint.string();
   if (keys != std::set<std::string>{"control.end_time"})
-    throw UserError(fmt::format("{}: belongs to another case, which differs in {}; restart with the case it was written by or "
-                                "choose another --out",
-                                where, differing_keys(text, ours)));
+    throw UserError(
+        fmt::format("{}: belongs to another case, which differs in {}; restart with the case it was written by or "
+                    "choose another --out",
+                    where, differing_keys(text, ours)));
   if (const int load = load_until_the_end(c); load >= 0)
-    throw UserError(fmt::format(
-        "{}: the case differs in {}, and load.{} depends on it (its factor is time / end_time): give that load a table or a "
-        "velocity from the start, or restart with the old end",
-        where, differing_keys(text, ours), load));
+    throw UserError(
+        fmt::format("{}: the case differs in {}, and load.{} depends on it (its factor is time / end_time): give that "
+                    "load a table or a "
+                    "velocity from the start, or restart with the old end",
+                    where, differing_keys(text, ours), load));
   if (c.control.end_time < time)
-    throw UserError(fmt::format("{}: was written at time {:g}, beyond the new control.end_time = {:g}; give a later one",
-                                where, time, c.control.end_time));
+    throw UserError(
+        fmt::format("{}: was written at time {:g}, beyond the new control.end_time = {:g}; give a later one", where,
+                    time, c.control.end_time));
   return theirs;
 }
 

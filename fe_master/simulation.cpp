@@ -148,8 +148,8 @@ std::string Run::stopped_by_the_disk(const std::string& reason) {
   const std::string state = last_checkpoint_ > 0
                                 ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
                                 : "there is no checkpoint to restart from";
-  const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again", reason,
-                                          whole_step_, whole_time_, state);
+  const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again",
+                                          reason, whole_step_, whole_time_, state);
   try {
     finish(kNotWritten, message);
   } catch (const DiskError&) {  // the same disk
@@ -279,8 +279,8 @@ void Run::write_fields() {
 }
 
 void Run::write_state() {
-  Checkpoint checkpoint{summary_.steps, solver_.committed().time, dt_, {}, {}, summary_.case_hash, options_.versions,
-                        comparable_toml(case_)};
+  Checkpoint checkpoint{summary_.steps,    solver_.committed().time, dt_, {}, {}, summary_.case_hash,
+                        options_.versions, comparable_toml(case_)};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back("run.counts",

@@ -111,7 +111,8 @@ int Path::go() {
                                 options_.folder.string(), last_.reason));
     }
   } catch (const DiskError& error) {
-    throw DiskError(fmt::format("{}; the last whole step is {}; make room and start again", error.what(), summary_.steps));
+    throw DiskError(
+        fmt::format("{}; the last whole step is {}; make room and start again", error.what(), summary_.steps));
   } catch (const std::exception& error) {
     finish(kPointFailed, error.what());
     throw;

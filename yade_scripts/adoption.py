@@ -38,7 +38,7 @@ def drives(O, engine):
 
 
 def finish_step(O):
-    """Ends the step in which an error or an exit of a hook, or substepping, has left the scene: its other engines do nothing."""
+    """Ends the step in which an error, an exit of a hook or substepping has left the scene; other engines do nothing."""
     O.subStepping = False
     if O.subStep < 0:
         return
@@ -108,8 +108,8 @@ def _refuse_unsuitable(O, names):
     massless = [b.id for b in O.bodies if not b.isClumpMember and not 0 < b.state.mass < float("inf")]
     if massless:
         raise ValueError(
-            f"Body {massless[0]} of the YADE scene has the mass {O.bodies[massless[0]].state.mass:g} kg: a volume element's grains "
-            "need a positive one; give their material a density."
+            f"Body {massless[0]} of the YADE scene has the mass {O.bodies[massless[0]].state.mass:g} kg: the grains of a volume "
+            "element need a positive one; give their material a density."
         )
     _refuse_partly_held(O)
     _refuse_partly_moved(O)

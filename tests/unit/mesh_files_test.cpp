@@ -97,24 +97,28 @@ TEST(MeshFiles, HangingNodesAndOverlapsAreRefused) {
 TEST(MeshFiles, EmptyOrNamelessGroupsAreRefused) {
   const std::string nameless = refusal(changed("plain.geo", "Physical Curve(\"top\")", "Physical Curve(77)"));
   EXPECT_NE(nameless.find("physical curve 77 has no name"), std::string::npos) << nameless;
-  EXPECT_NE(refusal(changed("plain.geo", "Physical Surface(\"soil\")", "Physical Surface(78)")).find("physical surface 78"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal(changed("plain.geo", "Physical Surface(\"soil\")", "Physical Surface(78)")).find("physical surface 78"),
+      std::string::npos);
   EXPECT_EQ(gmsh_mesh(data("without_names.geo")).edges.size(), 0u);
 }
 
 /// In processes of their own: Gmsh's parser does not forget a text that it could not end.
 TEST(MeshFiles, ErrorsInAGeometryAreRefused) {
-  for (const char* wrong : {"Plane Surface(1) = {9};", "nonsense(1) = {1};", "Plane Surface(1) = {1}; BooleanFragments{ Surface{1};",
-                            "Plane Surface(1) = {1}; Transfinite Surface {1} = {1, 2, 9};"}) {
+  for (const char* wrong :
+       {"Plane Surface(1) = {9};", "nonsense(1) = {1};", "Plane Surface(1) = {1}; BooleanFragments{ Surface{1};",
+        "Plane Surface(1) = {1}; Transfinite Surface {1} = {1, 2, 9};"}) {
     const std::string file = changed("plain.geo", "Plane Surface(1) = {1};", wrong);
-    EXPECT_EXIT(std::exit(refusal(file).find("Gmsh cannot read it") == std::string::npos), testing::ExitedWithCode(0), "");
+    EXPECT_EXIT(std::exit(refusal(file).find("Gmsh cannot read it") == std::string::npos), testing::ExitedWithCode(0),
+                "");
   }
 }
 
 /// The plate with its upper half in two groups, a corner and a curve in a group of points and in two of curves, as Gmsh
 /// writes it.
 std::string overlapping(double version, bool binary) {
-  const std::string file = (std::filesystem::path(testing::TempDir()) / fmt::format("groups_{}_{}.msh", version, binary)).string();
+  const std::string file =
+      (std::filesystem::path(testing::TempDir()) / fmt::format("groups_{}_{}.msh", version, binary)).string();
   gmsh::initialize(0, nullptr, false);
   gmsh::option::setNumber("General.Terminal", 0);
   gmsh::open(data("plain.geo"));
@@ -138,7 +142,8 @@ TEST(MeshFiles, GroupsOverlapInEveryFormatOfGmsh) {
       EXPECT_EQ(mesh.elements.size(), 4u);
       EXPECT_NEAR(area(mesh), 1.0, 1e-12);
       for (const char* region : {"soil", "all"}) EXPECT_EQ(mesh.regions.at(region), (std::vector<int>{0, 1, 2, 3}));
-      for (const char* edge : {"bottom", "right", "top", "left"}) EXPECT_NEAR(edge_length(mesh, edge), 1.0, 1e-12) << edge;
+      for (const char* edge : {"bottom", "right", "top", "left"})
+        EXPECT_NEAR(edge_length(mesh, edge), 1.0, 1e-12) << edge;
       EXPECT_NEAR(edge_length(mesh, "top_and_left"), 2.0, 1e-12);
     }
   }

@@ -1,7 +1,6 @@
 #include "restart.hpp"
 
 #include <gtest/gtest.h>
-
 #include <unistd.h>
 
 #include <array>
@@ -128,7 +127,8 @@ TEST(FolderLock, OfAnotherHostIsRefusedWithWhatToRemove) {
     const FolderLock lock(folder);
     FAIL();
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("running.lock says, and cannot be asked from this host"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("running.lock says, and cannot be asked from this host"),
+              std::string::npos);
     EXPECT_NE(std::string(error.what()).find("remove that file"), std::string::npos);
   }
 }

@@ -29,7 +29,11 @@ CPM = {
     "law": "Law2_ScGeom_CpmPhys_Cpm()",
     "end": "for i in O.interactions: i.phys.tanFrictionAngle = tan(radians(25))",
 }
-MINDLIN = {"physics": "Ip2_FrictMat_FrictMat_MindlinPhys(%s)", "law": "Law2_ScGeom_MindlinPhys_Mindlin()", "step": ".1 * PWaveTimeStep()"}
+MINDLIN = {
+    "physics": "Ip2_FrictMat_FrictMat_MindlinPhys(%s)",
+    "law": "Law2_ScGeom_MindlinPhys_Mindlin()",
+    "step": ".1 * PWaveTimeStep()",
+}
 VISCOELASTIC = {
     "material": "ViscElMat(kn=1e6, ks=5e5, cn=%g, cs=%g, frictionAngle=radians(20), density=2600)",
     "physics": "Ip2_ViscElMat_ViscElMat_ViscElPhys()",
