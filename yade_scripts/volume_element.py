@@ -101,13 +101,13 @@ class Engine:
         made = archive_check.state(self.O)
         state = self.O.sceneToString()
         manifest["state"] = f"{len(state)}-{zlib.crc32(state):08x}"
-        manifest["continuation"], said = self._compare(state, made, itself, spec["compare"])
+        manifest["continuation"], said = self._compare(state, made, itself, spec["compare"], spec["source"] == "prepare")
         notes += archive_check.notes_on_adoption(left, made, manifest["dropped"]) + said
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
         return {"state": state, "manifest": manifest}
 
-    def _compare(self, state, made, itself, steps):
+    def _compare(self, state, made, itself, steps, settled):
         """Lets the restored `state` go on for some steps beside the scene `itself` (continuation.Copy); the manifest's entry and
         sentences. Raises ValueError where the archive does not give back what was `made` (archive_check.State), or what
         the steps led to."""
@@ -129,7 +129,8 @@ class Engine:
             self.remove(ve)
             self._select(0)
         theirs = itself.ask((info["time_step"], L, steps))
-        return continuation.report(theirs, adopted, steps, float(np.linalg.norm(L)) * info["time_step"] * steps)
+        strain = float(np.linalg.norm(L)) * info["time_step"] * steps
+        return continuation.report(theirs, adopted, steps, strain, settled)
 
     def _at_rest(self):
         """The current scene's State when its grains stop: dashpots answer to a restored scene as if no contact slid, in the
