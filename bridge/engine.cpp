@@ -18,6 +18,8 @@ py::scoped_interpreter start_interpreter() {
   PyConfig_InitPythonConfig(&config);
   config.install_signal_handlers = 0;
   config.parse_argv = 0;
+  config.inspect =
+      1;  // a SystemExit that a hook of a user's script raises must not end the process: see script_exits.py
   PyConfig_SetBytesString(&config, &config.program_name, FEMXDEM_PYTHON);
   return py::scoped_interpreter(&config, 0, nullptr, false);
 }

@@ -24,8 +24,10 @@ PythonVolumeElements::Template PythonVolumeElements::make_template(const std::st
   drop_trial();
   const Reply reply = worker_.request(Command::make_template, 0, 0, specification_json);
   if (reply.kind == ReplyKind::child_died)
-    throw UserError(fmt::format("volume element: its preparation ended with {}; see the log for its last output",
-                                describe_wait_status(reply.value)));
+    throw UserError(
+        fmt::format("volume element: its preparation ended with {} by itself, its output is above; see what its script "
+                    "or its contact law does",
+                    describe_wait_status(reply.value)));
   const std::string mail = worker_.mail(reply);
   const auto state_size = static_cast<std::size_t>(reply.value);
   return {mail.substr(0, state_size), mail.substr(state_size)};

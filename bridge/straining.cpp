@@ -81,6 +81,10 @@ void judge(const VolumeElementOptions& options, const Straining& straining, std:
     return fail("it has lost all its contacts: no stress, no unbalanced force",
                 "It can carry no tension: keep it under pressure, give it ve.cohesion, or try a smaller load step.");
   const double unbalanced = response.report["unbalanced_force"];
+  if (!(unbalanced <= options.max_unbalanced_force) && straining.steps == 0)
+    return fail(fmt::format("unbalanced force {:.1e} without any strain, limit {:.1e}", unbalanced,
+                            options.max_unbalanced_force),
+                "The state that it starts from is not at rest: let the scene come to rest before it is adopted.");
   if (!(unbalanced <= options.max_unbalanced_force))
     return fail(fmt::format("unbalanced force {:.1e} after {} steps, limit {:.1e}", unbalanced, straining.steps,
                             options.max_unbalanced_force),

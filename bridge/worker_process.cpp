@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <system_error>
@@ -46,6 +47,7 @@ std::vector<std::string> worker_environment(bool sorted_contacts) {
       ours = ours || text.starts_with(prefix);
     if (!ours) kept.emplace_back(text);
   }
+  if (std::getenv("HOME") == nullptr) kept.emplace_back("HOME=/tmp");  // YADE's modules look for it
   kept.emplace_back("OMP_NUM_THREADS=1");
   kept.emplace_back("OMP_THREAD_LIMIT=1");
   if (sorted_contacts) kept.emplace_back("FEMXDEM_SORTED_CONTACTS=1");

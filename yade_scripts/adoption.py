@@ -5,6 +5,7 @@ engines of their own stay too. Whatever strains, stops, records or calls back is
 cell from then on.
 """
 
+from archive_check import refuse_not_finite
 from contact_laws import resting_time_step
 
 KEPT = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
@@ -30,8 +31,33 @@ def adopt(O):
     return {**names, "reset": _reset(O, kept[-1])}
 
 
+def drives(O, engine):
+    """Whether an engine is of those that adoption drops, but for gravity and its like: it strains, stops or records."""
+    bases = [base for base in DROPPED if base != "FieldApplier"]
+    return engine.dead or type(engine).__name__ in _with_derived(O, bases)
+
+
+def finish_step(O):
+    """Ends the step in which an error, an exit of a hook or substepping has left the scene; other engines do nothing."""
+    O.subStepping = False
+    if O.subStep < 0:
+        return
+    alive = [e for e in O.engines if not e.dead]
+    time_step, O.dt = O.dt, 0.0
+    for engine in alive:
+        engine.dead = True
+    O.step()
+    for engine in alive:
+        engine.dead = False
+    O.dt = time_step
+
+
+def _with_derived(O, bases):
+    return {name for base in bases for name in (base, *_derived(O, base))}
+
+
 def _sort_engines(O):
-    droppable = {name for base in DROPPED for name in (base, *_derived(O, base))}
+    droppable = _with_derived(O, DROPPED)
     kept, dropped = [], []
     for engine in O.engines:
         name = type(engine).__name__
@@ -79,8 +105,61 @@ def _refuse_unsuitable(O, names):
             )
         if not b.dynamic and not b.isClumpMember:
             raise ValueError(f"Body {b.id} of the YADE scene is held (dynamic is False): every grain must be free.")
+    massless = [b.id for b in O.bodies if not b.isClumpMember and not 0 < b.state.mass < float("inf")]
+    if massless:
+        raise ValueError(
+            f"Body {massless[0]} of the YADE scene has the mass {O.bodies[massless[0]].state.mass:g} kg: the grains of a volume "
+            "element need a positive one; give their material a density."
+        )
+    _refuse_partly_held(O)
+    _refuse_partly_moved(O)
+    _refuse_permanent_forces(O)
     if O.interactions.countReal() == 0:
         raise ValueError("The YADE scene has no contacts: a volume element must carry a stress.")
+
+
+def _refuse_partly_held(O):
+    """All grains may be blocked alike (a plane of grains: "zXY"), but not some, and not in all translations."""
+    held = {}
+    for b in O.bodies:
+        if not b.isClumpMember:
+            held.setdefault("".join(c for c in "xyz" if c in b.state.blockedDOFs), []).append(b.id)
+    if len(held) > 1:
+        rare = min(held, key=lambda dofs: len(held[dofs]))
+        usual = max(held, key=lambda dofs: len(held[dofs]))
+        raise ValueError(
+            f"{len(held[rare])} of {sum(map(len, held.values()))} grains of the YADE scene, body {held[rare][0]} among them, "
+            f"have their translations blocked by blockedDOFs = \"{rare}\", others by \"{usual}\": a volume element's grains "
+            "must all be free, or blocked alike; set blockedDOFs at the end of the script."
+        )
+    if "xyz" in held:
+        raise ValueError(
+            'All grains of the YADE scene have their translations blocked (blockedDOFs holds "xyz"): they must be free.'
+        )
+
+
+def _refuse_partly_moved(O):
+    """NewtonIntegrator.mask leaves bodies of other groups where they are."""
+    mask = next(e for e in O.engines if type(e).__name__ == "NewtonIntegrator").mask
+    left = [b.id for b in O.bodies if mask > 0 and not b.mask & mask]
+    if left:
+        raise ValueError(
+            f"The integrator of the YADE scene moves only bodies of its mask {mask}, so not {len(left)} bodies, body {left[0]} "
+            "among them: a volume element's grains must all be free; set its mask to 0 at the end of the script."
+        )
+
+
+def _refuse_permanent_forces(O):
+    """Forces of O.forces.setPermF are no state of a volume element, and YADE saves them nowhere."""
+    if not O.forces.getPermForceUsed():
+        return
+    pushed = [b.id for b in O.bodies if O.forces.permF(b.id).norm() > 0 or O.forces.permT(b.id).norm() > 0]
+    if pushed:
+        raise ValueError(
+            f"Permanent forces or torques (O.forces.setPermF, setPermT) act on {len(pushed)} bodies of the YADE scene, body "
+            f"{pushed[0]} among them: a volume element is loaded by its cell alone, and YADE does not save them; take them "
+            "off with O.forces.setPermF(id, Vector3.Zero) and let the scene come to rest before the script ends."
+        )
 
 
 def _reset(O, integrator):
@@ -96,6 +175,11 @@ def _reset(O, integrator):
         done.append("velocity gradient of the cell set to zero")
         O.cell.velGrad = Matrix3.Zero
     O.dt = resting_time_step(O)
+    O.subStepping = True
+    for _ in range(len(O.engines)):
+        O.step()  # the forces alone: what is not a number must not move the grains, or YADE's collider ends the process
+    O.subStepping = False
+    refuse_not_finite(O, "as its maker left it")
     O.step()  # YADE applies a new velocity gradient in the integrator: one step that takes no time
     O.dt = 0.0
     done.append("velocities of the grains set to zero")
@@ -103,6 +187,11 @@ def _reset(O, integrator):
     if O.cell.trsf != Matrix3.Identity:
         done.append("deformation gradient of the cell set to the identity")
         O.cell.trsf = Matrix3.Identity
+    scaled = [b for b in O.bodies if b.state.densityScaling not in (1.0, -1.0)]  # YADE saves it, but not its use
+    if scaled:
+        done.append(f"density scaling of {len(scaled)} bodies taken off")
+        for b in scaled:
+            b.state.densityScaling = 1.0
     if integrator.gravity != Vector3.Zero:
         done.append("gravity set to zero")
         integrator.gravity = Vector3.Zero

@@ -52,16 +52,25 @@ def _positions_by_id(O):
     return x
 
 
-def has_stiffness(c):
-    """Whether the contacts' physics know their stiffnesses kn and ks."""
-    return bool(c.pairs) and all(hasattr(c.pairs[0].phys, name) for name in ("kn", "ks"))
+def has_stiffness(O, c):
+    """Whether the physics of all contacts know their stiffnesses kn and ks, and have filled them in."""
+    if not c.pairs or _all_alike(O, c):
+        return bool(c.pairs)
+    return all(hasattr(p, name) for p in c.phys for name in ("kn", "ks")) and all(
+        np.isfinite(k).all() and (k > 0).all() for k in (values(c, "kn"), values(c, "ks"))
+    )
+
+
+def _all_alike(O, c):
+    """Whether the scene notes constant stiffnesses and its first contact has them."""
+    constant = contact_laws.constant_stiffness(O)
+    return constant and np.allclose(constant, (c.pairs[0].phys.kn, c.pairs[0].phys.ks), rtol=1e-12, atol=0)
 
 
 def stiffnesses(O, c):
     """kn and ks of the contacts, (m,) each [N/m]; not read one by one in a packing whose contacts are all alike."""
-    constant = contact_laws.constant_stiffness(O)
-    if constant and np.allclose(constant, (c.pairs[0].phys.kn, c.pairs[0].phys.ks), rtol=1e-12, atol=0):
-        return tuple(np.full(len(c.pairs), k) for k in constant)
+    if _all_alike(O, c):
+        return tuple(np.full(len(c.pairs), k) for k in contact_laws.constant_stiffness(O))
     return values(c, "kn"), values(c, "ks")
 
 
@@ -131,19 +140,39 @@ def at_coulomb_limit(c, radius):
 
     radius (n,) of the bodies [m]. False for laws without a Coulomb limit.
     """
-    if not c.phys or not hasattr(c.phys[0], "tangensOfFrictionAngle"):
-        return np.zeros(len(c.phys), dtype=bool)
-    if hasattr(c.phys[0], "shearAdhesion"):
-        overlap = radius[c.ids].sum(axis=1) - c.length
-        normal_force = values(c, "kn") * (overlap - values(c, "unp"))
-        limit = np.maximum(values(c, "shearAdhesion") + values(c, "tangensOfFrictionAngle") * normal_force, 0.0)
-    else:
-        limit = values(c, "tangensOfFrictionAngle") * norms(c, "normalForce")
-    return norms(c, "shearForce") >= (1 - 1e-6) * limit
+    slides = np.zeros(len(c.phys), dtype=bool)
+    for k, part in _by_class(c):
+        if not hasattr(part.phys[0], "tangensOfFrictionAngle"):
+            continue
+        if hasattr(part.phys[0], "shearAdhesion"):
+            overlap = radius[part.ids].sum(axis=1) - part.length
+            unp = values(part, "unp") if hasattr(part.phys[0], "unp") else 0.0
+            normal_force = values(part, "kn") * (overlap - unp)
+            limit = values(part, "shearAdhesion") + values(part, "tangensOfFrictionAngle") * normal_force
+            limit = np.maximum(limit, 0.0)
+        else:
+            limit = values(part, "tangensOfFrictionAngle") * norms(part, "normalForce")
+        slides[k] = norms(part, "shearForce") >= (1 - 1e-6) * limit
+    return slides
 
 
 def adhesive(c):
     """(m,) whether a contact still has its adhesion."""
-    if not c.phys or not hasattr(c.phys[0], "normalAdhesion"):
-        return np.zeros(len(c.phys), dtype=bool)
-    return (values(c, "normalAdhesion") > 0) & (values(c, "cohesionBroken") == 0)
+    adheres = np.zeros(len(c.phys), dtype=bool)
+    for k, part in _by_class(c):
+        if all(hasattr(part.phys[0], name) for name in ("normalAdhesion", "cohesionBroken")):
+            adheres[k] = (values(part, "normalAdhesion") > 0) & (values(part, "cohesionBroken") == 0)
+    return adheres
+
+
+def _by_class(c):
+    """The contacts by the class of their physics: (places among all, Contacts) of each; most packings have one class."""
+    classes = list(map(type, c.phys))
+    kinds = set(classes)
+    if len(kinds) == 1:
+        return [(slice(None), c)]
+    found = []
+    for kind in sorted(kinds, key=lambda k: k.__name__):
+        k = np.array([i for i, other in enumerate(classes) if other is kind])
+        found.append((k, Contacts(c.ids[k], c.normal[k], c.length[k], [c.pairs[i] for i in k])))
+    return found

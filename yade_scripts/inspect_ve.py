@@ -125,14 +125,26 @@ def _save(figure, file):
     print(file)
 
 
+def _refuse(sentence):
+    """Bad input: status 2, as the program's own."""
+    print(sentence, file=sys.stderr)
+    sys.exit(2)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("state", metavar="STATE", type=Path)
     parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("."))
     arguments = parser.parse_args()
     if not arguments.state.is_file():
-        sys.exit(f"{arguments.state}: no such file; give a state of the cache of `femxdem ve prepare`")
-    packing = Packing(arguments.state.read_bytes())
+        _refuse(f"{arguments.state}: no such file; give a state of the cache of `femxdem ve prepare`")
+    try:
+        packing = Packing(arguments.state.read_bytes())
+    except (RuntimeError, MemoryError, ValueError) as error:
+        _refuse(
+            f"{arguments.state}: is not a whole volume element of this version of YADE ({error}); make it anew with "
+            "`femxdem ve prepare`"
+        )
     arguments.out.mkdir(parents=True, exist_ok=True)
     draw_packing(packing, arguments.out / "packing.png")
     draw_force_chains(packing, arguments.out / "force_chains.png")

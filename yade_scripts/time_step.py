@@ -3,6 +3,8 @@
 import numpy as np
 
 import contact_laws
+import rolling
+import viscosity
 from contact_loop import contacts, has_stiffness, values
 
 ITERATIONS = 60
@@ -16,11 +18,17 @@ def set_time_step(O, own, safety):
     from yade.utils import PWaveTimeStep
 
     c = contacts(O)
-    if has_stiffness(c) and not any(b.isClump for b in O.bodies):
-        O.dt = safety * critical_time_step(O, c)
+    clumped = any(b.isClump for b in O.bodies)
+    if has_stiffness(O, c) and not clumped:
+        critical = critical_time_step(O, c)
+        damping = viscosity.damping_ratio(O, critical, own)
+        O.dt = safety * viscosity.damped(critical, damping)
         contact_laws.note_time_step_safety(O, safety)
-        return "contact network"
+        viscosity.note(O, damping)
+        return "contact network with its dashpots" if damping > 0 else "contact network"
     waves = safety * PWaveTimeStep()
+    if not clumped:
+        waves = safety * viscosity.damped(waves / safety, viscosity.damping_ratio(O, waves / safety, own))
     O.dt = own if 0 < own < waves else waves
     return "the scene" if O.dt == own else "P waves"
 
@@ -32,13 +40,14 @@ def follow_network(O):
     safety = contact_laws.time_step_safety(O)
     if safety is None or contact_laws.constant_stiffness(O) or not O.interactions.countReal():
         return
-    safe = safety * critical_time_step(O, contacts(O))
+    safe = safety * viscosity.damped(critical_time_step(O, contacts(O)), viscosity.noted(O))
     if not KEPT[0] <= O.dt / safe <= KEPT[1]:
         O.dt = safe
 
 
 def critical_time_step(O, c):
-    """2/omega_max of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin.
+    """2/omega_max of the network of contacts `c` (contact_loop.Contacts) between spheres that move and spin, with the rolling
+    and twisting stiffnesses that it may have.
 
     Power iteration on M^-1 K; K holds kn along the normal and kt across it, acting on
     u_j - u_i - (r_i theta_i + r_j theta_j) x n. Its estimate of omega_max comes from below, within some per cent.
@@ -47,6 +56,7 @@ def critical_time_step(O, c):
     i, j = c.ids.T
     n, kn, kt = c.normal, values(c, "kn")[:, None], values(c, "ks")[:, None]
     ri, rj = radius[i][:, None], radius[j][:, None]
+    turning = rolling.stiffness(c)
     rng = np.random.default_rng(0)
     u, w = rng.standard_normal((2, len(mass), 3))
     omega2 = 0.0
@@ -57,6 +67,9 @@ def critical_time_step(O, c):
         t = _cross(n, f)
         force = _sums(np.concatenate([j, i]), np.concatenate([f, -f]), len(mass))
         torque = _sums(np.concatenate([i, j]), np.concatenate([-ri * t, -rj * t]), len(mass))
+        if turning:  # K of the moments: torques oppose as forces do, with the sign of `force` here
+            m = rolling.moments(c, turning, w)
+            torque = torque + _sums(np.concatenate([j, i]), np.concatenate([m, -m]), len(mass))
         energy = (u * force).sum() + (w * torque).sum()  # 2 x potential, over 2 x kinetic: Rayleigh's quotient
         omega2 = energy / ((mass[:, None] * u * u).sum() + (inertia[:, None] * w * w).sum())
         u, w = force / mass[:, None], torque / inertia[:, None]

@@ -3,10 +3,15 @@
 import ctypes
 import os
 import sys
+import tempfile
 import threading
 import time
 import types
 from pathlib import Path
+
+from script_exits import Left, catch_exits, left
+from script_inputs import recorded
+from script_windows import close_windows, drop_nothings
 
 
 def load_scene(O, path):
@@ -27,61 +32,77 @@ def run_script(O, path, arguments, steps, seconds):
 
     Windows are not opened: yade.qt is replaced by a module that answers to any name. A simulation left running in the
     background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. The script is
-    stopped where it is when its scene has made `steps` DEM steps, or, for want of steps, after `seconds` of wall time.
-    Returns sentences on what was special. Raises ValueError when the script is missing, fails, or one of its hooks does.
+    stopped where it is when its scene has made `steps` DEM steps, or, for want of steps, after `seconds` of wall time; it may
+    end its process in whatever way: the scene is then what it is at that moment.
+    Returns (sentences on what was special, {file that it read: hash}). Raises ValueError when the script is missing, fails, or
+    one of its hooks does.
     """
     if not Path(path).is_file():
         raise ValueError(f've.script = "{path}": no such file.')
     os.environ["MPLBACKEND"] = "Agg"
-    _without_windows()
+    os.environ.setdefault("HOME", tempfile.gettempdir())  # yade.plot and Matplotlib look for it
+    close_windows()
     names = sys.modules["__main__"].__dict__
     names.update(_namespace(O), __file__=str(path))
     sys.argv = [str(path), *arguments]
     _prepare_runtime(sys.argv)
     notes = []
-    clock = threading.Timer(seconds, _interrupt, (O, threading.get_ident()))
-    clock.daemon = True
-    clock.start()
     here = os.getcwd()
     sys.path.insert(0, str(Path(path).resolve().parent))
     sys.last_value = None  # where Python leaves the error of a hook, which YADE only reports as one of its own
-    restore = _limit_steps(O, steps)
-    try:
-        exec(compile(Path(path).read_text(), str(path), "exec"), names)
-        if O.iter == 0 and O.engines:
-            notes.append("the script did not start its simulation: run until its own hooks paused it")
-            O.run()
-        if O.running:
-            O.wait()
-    except _EnoughSteps:
-        pass
-    except _TimeUp:
-        notes.append(f"the script's simulation was stopped after {seconds:g} s")
-    except SystemExit:
-        notes.append("the script called exit")
-    except Exception as error:
-        true = sys.last_value or error
-        where = "failed in one of its hooks" if sys.last_value else "failed"
-        raise ValueError(f've.script = "{path}" {where}: {type(true).__name__}: {true}') from error
-    finally:
-        clock.cancel()
-        restore()
-        while O.running:
-            O.pause()
-            time.sleep(0.05)
-        os.chdir(here)
+    run_calls = []
+    undo = [_limit_steps(O, steps, run_calls), catch_exits(O), drop_nothings(O)]
+    clock = threading.Timer(seconds, _interrupt, (O, threading.get_ident()))
+    clock.daemon = True
+    clock.start()
+    with recorded(O, path) as recorder:
+        try:
+            exec(compile(Path(path).read_bytes(), str(path), "exec"), names)
+            if O.iter == 0 and not run_calls and O.engines:
+                notes.append("the script did not start its simulation: run until its own hooks paused it")
+                O.run()
+            if O.running:
+                O.wait()
+        except _EnoughSteps:
+            pass
+        except _TimeUp:
+            notes.append(f"the script's simulation was stopped after {seconds:g} s")
+        except (Exception, KeyboardInterrupt, SystemExit, Left) as error:
+            if not left(error):
+                raise _failure(path, error) from error
+            in_hook = not isinstance(error, (Left, SystemExit))
+            notes.append("the script called exit" + (" in one of its hooks: adopted as it was then" if in_hook else ""))
+        finally:
+            clock.cancel()
+            while O.running:
+                O.pause()
+                time.sleep(0.05)
+            for back in undo:
+                back()
+            os.chdir(here)
+    if undo[2].dropped:
+        notes.append(f"{undo[2].dropped} engines of the graphics were left out")
+    if recorder.programs:
+        notes.append(f"the script started {recorder.programs[0]}: what other programs read is not followed")
     if O.iter >= steps:
         notes.append(f"the script's simulation was stopped after {steps} steps")
-    return notes
+    return notes, recorder.inputs
+
+
+def _failure(path, error):
+    """The sentence on a script that failed: the error of a hook is the true one, YADE only reports it as one of its own."""
+    true = sys.last_value or error
+    where = "failed in one of its hooks" if sys.last_value else "failed"
+    return ValueError(f've.script = "{path}" {where}: {type(true).__name__}: {true}')
 
 
 class _EnoughSteps(BaseException):
     """Raised in the script when its scene has made its steps."""
 
 
-def _limit_steps(O, limit):
+def _limit_steps(O, limit, run_calls):
     """From now on run, wait and step of YADE's scene end at step number `limit`; returns what undoes it. The other scene,
-    where yade.pack makes packings, has no limit."""
+    where yade.pack makes packings, has no limit. Calls of run and step are noted in `run_calls`."""
     Omega = type(O)
     original = {name: getattr(Omega, name) for name in ("run", "wait", "step", "switchScene")}
     in_other_scene = False
@@ -94,6 +115,7 @@ def _limit_steps(O, limit):
         stop_at_limit()
         if in_other_scene:
             return original["run"](self, nSteps, wait)
+        run_calls.append("run")
         left = limit - O.iter
         if nSteps <= 0 and O.stopAtIter > O.iter:
             nSteps = O.stopAtIter - O.iter
@@ -107,6 +129,8 @@ def _limit_steps(O, limit):
 
     def step(self):
         stop_at_limit()
+        if not in_other_scene:
+            run_calls.append("step")
         original["step"](self)
 
     def switch_scene(self):
@@ -131,31 +155,6 @@ def _interrupt(O, thread):
     """Makes `thread` leave a blocking O.run or O.wait and raise _TimeUp."""
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_TimeUp))
     O.pause()
-
-
-class _Nothing:
-    """Answers to any name, call, index or assignment."""
-
-    def __getattr__(self, name):
-        return _Nothing()
-
-    def __call__(self, *args, **kwargs):
-        return _Nothing()
-
-    def __getitem__(self, key):
-        return _Nothing()
-
-    def __setitem__(self, key, value):
-        pass
-
-
-def _without_windows():
-    import yade
-
-    qt = types.ModuleType("yade.qt")
-    qt.__getattr__ = lambda name: _Nothing()
-    sys.modules["yade.qt"] = qt
-    yade.qt = qt
 
 
 def _prepare_runtime(argv):

@@ -3,6 +3,7 @@
 import math
 import os
 import time
+import zlib
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from operator import methodcaller
@@ -10,17 +11,25 @@ from operator import methodcaller
 import numpy as np
 
 import adoption
+import archive_check
 import compact_scene
 import contact_laws
 import contact_loop
+import continuation
 import packing
 import probing
 import unit_of_time
 import user_scenes
+import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"arguments": (), "script_steps": 1_000_000, "script_seconds": 600.0}  # of a user's script; no case sets the last two
+DEFAULTS = {  # of what no case sets
+    "arguments": (),
+    "script_steps": 1_000_000,
+    "script_seconds": 600.0,
+    "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
+}
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
@@ -72,31 +81,82 @@ class Engine:
     def make_template(self, spec):
         started = time.perf_counter()
         spec = {**DEFAULTS, **spec}
-        manifest = {"source": spec["source"], "notes": self._make_scene(spec)}
-        own = self.O.dt
-        manifest.update(adoption.adopt(self.O))
-        manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
-        self._to_forces()
+        notes, inputs = self._make_scene(spec)
+        manifest = {"source": spec["source"], "notes": notes, "inputs": sorted(inputs.items())}
+        adoption.finish_step(self.O)
+        archive_check.refuse_lost_grains(self.O)
+        left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None
+        own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
+        try:
+            manifest.update(adoption.adopt(self.O))
+            manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
+            self._to_forces()
+            archive_check.refuse_not_finite(self.O, "after its adoption")
+        except Exception:
+            itself.dismiss()
+            raise
         grains = _grains(self.O)
         manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
         manifest["stress"] = np.array(self._utils.getStress()).ravel().tolist()
+        made = archive_check.state(self.O)
+        state = self.O.sceneToString()
+        manifest["state"] = f"{len(state)}-{zlib.crc32(state):08x}"
+        manifest["continuation"], said = self._compare(state, made, itself, spec["compare"], spec["source"] == "prepare")
+        notes += archive_check.notes_on_adoption(left, made, manifest["dropped"]) + said
         manifest.update(versions=self.versions(), seconds=time.perf_counter() - started)
         manifest["made"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
-        return {"state": self.O.sceneToString(), "manifest": manifest}
+        return {"state": state, "manifest": manifest}
+
+    def _compare(self, state, made, itself, steps, settled):
+        """Lets the restored `state` go on for some steps beside the scene `itself` (continuation.Copy); the manifest's entry and
+        sentences. Raises ValueError where the archive does not give back what was `made` (archive_check.State), or what
+        the steps led to."""
+        ve = self.add(state)
+        try:
+            archive_check.refuse_dropped(made, archive_check.state(self.O), self.O, "as it was made")
+            info = self.info(ve)
+            L = continuation.strain_rate(info["time_scale"], info["time_step"])
+            self.deform(ve, L, steps)
+            adopted = archive_check.state(self.O)
+            archive_check.refuse_not_finite(self.O, f"after {steps} steps of a small strain")
+            before = self._at_rest() if viscosity.noted(self.O) > 0 else adopted
+            self.replace(ve, self.save(ve))
+            archive_check.refuse_dropped(before, archive_check.state(self.O), self.O, f"after {steps} steps of a small strain")
+        except Exception:
+            itself.dismiss()
+            raise
+        finally:
+            self.remove(ve)
+            self._select(0)
+        theirs = itself.ask((info["time_step"], L, steps))
+        strain = float(np.linalg.norm(L)) * info["time_step"] * steps
+        return continuation.report(theirs, adopted, steps, strain, settled)
+
+    def _at_rest(self):
+        """The current scene's State when its grains stop: dashpots answer to a restored scene as if no contact slid, in the
+        one step after a checkpoint (Hertz-Mindlin: 2e-5 of the forces), and are no state."""
+        O = self.O
+        O.cell.velGrad = self._Matrix3.Zero
+        time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
+        O.step()
+        self._utils.calm()
+        self._to_forces()
+        O.dt = time_step
+        return archive_check.state(O)
 
     def _make_scene(self, spec):
-        """Fills the current scene as the case says; sentences on what was special."""
+        """Fills the current scene as the case says; sentences on what was special, {file that a script read: hash}."""
         self._select(0)
         self.O.resetThisScene()
         if spec["source"] == "prepare":
             packing.prepare(self.O, spec)
-            return []
+            return [], {}
         if spec["source"] == "scene":
             user_scenes.load_scene(self.O, spec["scene"])
-            return []
+            return [], {}
         if spec["source"] == "script":
             limits = spec["script_steps"], spec["script_seconds"]
             return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
@@ -214,7 +274,7 @@ class Engine:
     def stiffness(self, ve, out_stiffness, relaxed=False):
         self._select(ve)
         c, volume = contact_loop.contacts(self.O), self.O.cell.volume
-        if contact_loop.has_stiffness(c) and not self._grains[ve].clumped:
+        if contact_loop.has_stiffness(self.O, c) and not self._grains[ve].clumped:
             kn, kt = contact_loop.stiffnesses(self.O, c)
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)

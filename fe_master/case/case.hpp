@@ -73,6 +73,9 @@ Case read_case(const std::string& path, const std::vector<std::string>& override
 /// Every parameter with its value, as a case file that reads back to the same case.
 std::string effective_toml(const Case& c);
 
+/// effective_toml of what a case computes: without [output] and paths, the hashes of their contents in place of files.
+std::string comparable_toml(const Case& c);
+
 /// Reference of all parameters, by section: key, type, unit, default, bounds, text.
 std::string describe_parameters();
 

@@ -322,6 +322,13 @@ void check_path(const Case& c, Purpose purpose, Mistakes& m) {
   for (std::size_t i = 0; i < c.path.size(); ++i) check_segment(c.path[i], fmt::format("path.{}", i), m);
 }
 
+/// Only a Gmsh file can be without edges: a structured mesh has its own.
+std::string nothing_named(const std::string& noun) {
+  if (noun == "edge") return "the mesh has none; name them in Gmsh, as in Physical Curve(\"top\") = {3};";
+  if (noun == "region") return "there is none; give a [[region]], or in Gmsh a Physical Surface(\"soil\") = {1};";
+  return fmt::format("the case has no {}s", noun);
+}
+
 }  // namespace
 
 void require(Mistakes& m, const std::string& section, const Keys& keys, const std::string& reason) {
@@ -340,7 +347,7 @@ void require_known(const std::string& name, const std::set<std::string>& known, 
   for (const std::string& other : all) list += (list.empty() ? "" : ", ") + other;
   m.add(key, fmt::format("there is no {} '{}'; {}", noun, name,
                          !near.empty()  ? fmt::format("did you mean '{}'?", near)
-                         : list.empty() ? fmt::format("the case has no {}s", noun)
+                         : list.empty() ? nothing_named(noun)
                                         : fmt::format("the {}s are {}", noun, list)));
 }
 

@@ -147,6 +147,8 @@ Section<VeParameters> ve_section() {
        path("script", &V::script, "YADE script, run unchanged, then adopted"),
        path("scene", &V::scene, "saved scene (.yade.gz, .xml.bz2), adopted"),
        parameter("arguments", &V::arguments, "", kAny, "command-line arguments of the script"),
+       parameter("script_steps", &V::script_steps, "", kAtLeastOne, "the script is stopped after so many DEM steps"),
+       parameter("script_seconds", &V::script_seconds, "s", kPositive, "and after so long, for want of steps"),
        parameter("spheres", &V::spheres, "", {20.0, 1e6}, "number of spheres"),
        parameter("size_ratio", &V::size_ratio, "", {1.0, 20.0}, "largest over smallest diameter"),
        parameter("kappa", &V::kappa, "", {1.0, 1e7}, "stiffness k_n / (sigma_0 a)"),
@@ -185,7 +187,8 @@ Section<VeParameters> ve_section() {
        parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
        word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
        parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
-       parameter("cache", &V::cache, "", kAny, "folder of prepared packings; empty: packings beside the results")}};
+       parameter("cache", &V::cache, "", kAny, "folder of prepared packings; empty: packings in the working folder, or in that of the results where "
+                     "the former cannot be written")}};
 }
 
 Section<Load> load_section() {

@@ -162,14 +162,16 @@ std::string describe_parameters() {
   return out;
 }
 
-std::string case_hash(const Case& c) {
+std::string comparable_toml(const Case& c) {
   Case placeless = c;
   placeless.output = {};
   placeless.mesh.file = hash_text(read_file(c.mesh.file));
   forget_places(placeless.ve);
   for (RegionVe& region : placeless.ve_regions) forget_places(region.ve);
-  return hash_text(effective_toml(placeless));
+  return effective_toml(placeless);
 }
+
+std::string case_hash(const Case& c) { return hash_text(comparable_toml(c)); }
 
 std::string ve_spec_json(const VeParameters& ve) {
   std::string out;

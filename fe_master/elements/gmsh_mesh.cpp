@@ -8,6 +8,8 @@
 
 #include "errors.hpp"
 #include "mesh.hpp"
+#include "mesh_gaps.hpp"
+#include "msh2_file.hpp"
 
 namespace femxdem {
 
@@ -15,6 +17,7 @@ namespace {
 
 constexpr int kLine3 = 8;  // Gmsh's element types
 constexpr int kQuad8 = 16;
+constexpr double kRoundOff = 1e-9;  // of the mesh's size: a z below it is 0
 
 /// Gmsh's session; it has one per process.
 struct GmshSession {
@@ -64,10 +67,15 @@ std::map<std::size_t, int> read_nodes(const ElementBlock& quads, const std::stri
   std::map<std::size_t, Eigen::Vector3d> position;
   for (std::size_t n = 0; n < tags.size(); ++n) position[tags[n]] = {x[3 * n], x[3 * n + 1], x[3 * n + 2]};
   std::map<std::size_t, int> number;
-  for (std::size_t tag : quads.nodes) number[tag] = 0;
+  Eigen::AlignedBox3d box;
+  for (std::size_t tag : quads.nodes) {
+    number[tag] = 0;
+    box.extend(position.at(tag));
+  }
+  const double round_off = kRoundOff * box.diagonal().head<2>().norm();
   for (auto& [tag, n] : number) {
     const Eigen::Vector3d& p = position.at(tag);
-    if (p.z() != 0.0)
+    if (!(std::abs(p.z()) <= round_off))
       throw UserError(
           fmt::format("{}: node {} lies at z = {:.3g}; draw the mesh in the plane z = 0", file, tag, p.z()));
     n = static_cast<int>(mesh.nodes.size());
@@ -113,13 +121,26 @@ std::multimap<int, Side> sides_by_middle(const Mesh& mesh) {
   return sides;
 }
 
-std::string group_name(int dim, int tag, const std::string& file) {
+/// Name of a physical group. Gmsh's library knows one group of each name; the file may have given it to several.
+std::string group_name(int dim, int tag, const MshGroups& given, const std::string& file) {
   std::string name;
   gmsh::model::getPhysicalName(dim, tag, name);
+  const auto entry = given.names.find({dim, tag});
+  if (entry != given.names.end()) name = entry->second;
   if (name.empty())
-    throw UserError(fmt::format("{}: physical {} {} has no name; write Physical {}(\"name\") = ...", file,
-                                dim == 1 ? "curve" : "surface", tag, dim == 1 ? "Curve" : "Surface"));
+    throw UserError(
+        fmt::format("{0}: physical {1} {2} has no name, or one that another group has already; write Physical "
+                    "{3}(\"name\") = {{...}} with all {1}s of that name",
+                    file, dim == 1 ? "curve" : "surface", tag, dim == 1 ? "Curve" : "Surface"));
   return name;
+}
+
+/// Whether an element that lies on one of a group's entities is in the group: a file of format 2 says it of each
+/// element.
+bool is_in_group(std::size_t element, int group, const MshGroups& given) {
+  if (!given.groups) return true;
+  const auto entry = given.groups->find(element);
+  return entry != given.groups->end() && entry->second.count(group) > 0;
 }
 
 std::vector<int> group_entities(int dim, int tag) {
@@ -128,50 +149,78 @@ std::vector<int> group_entities(int dim, int tag) {
   return entities;
 }
 
-std::vector<Side> sides_of_curve(int group, const std::string& name, const std::string& file,
-                                 const std::map<std::size_t, int>& number, const std::multimap<int, Side>& all) {
-  std::vector<Side> sides;
+/// Sides of a physical curve that are not among `sides` yet are appended: entities and their lines may be listed more
+/// than once.
+void add_sides_of_curve(int group, const std::string& name, const std::string& file, const MshGroups& given,
+                        const std::map<std::size_t, int>& number, const std::multimap<int, Side>& all,
+                        std::vector<Side>& sides) {
   for (int entity : group_entities(1, group)) {
     const ElementBlock lines = elements_of_type(kLine3, 1, entity, file);
     for (std::size_t l = 0; l < lines.tags.size(); ++l) {
+      if (!is_in_group(lines.tags[l], group, given)) continue;
       const auto middle = number.find(lines.nodes[3 * l + 2]);
       const std::size_t owners = middle == number.end() ? 0 : all.count(middle->second);
       if (owners != 1)
         throw UserError(fmt::format(
             "{}: physical curve '{}' is a side of {} elements; name curves of the boundary only", file, name, owners));
-      sides.push_back(all.find(middle->second)->second);
+      const Side& side = all.find(middle->second)->second;
+      const bool known = std::any_of(sides.begin(), sides.end(), [&](const Side& s) { return s.nodes == side.nodes; });
+      if (!known) sides.push_back(side);
     }
   }
-  return in_order(sides);
+}
+
+/// Elements of the file, each once however often it is listed; the map is from Gmsh's tag to our number.
+std::map<std::size_t, int> read_elements(const ElementBlock& quads, const std::map<std::size_t, int>& number,
+                                         Mesh& mesh) {
+  std::map<std::size_t, int> element_number;
+  std::map<std::array<int, 8>, int> known;
+  for (std::size_t q = 0; q < quads.tags.size(); ++q) {
+    std::array<int, 8> nodes{};
+    for (int a = 0; a < 8; ++a) nodes[a] = number.at(quads.nodes[8 * q + a]);
+    std::array<int, 8> sorted = nodes;
+    std::sort(sorted.begin(), sorted.end());
+    const auto [entry, is_new] = known.emplace(sorted, static_cast<int>(mesh.elements.size()));
+    element_number[quads.tags[q]] = entry->second;
+    if (is_new) mesh.elements.push_back(oriented(nodes, mesh));
+  }
+  return element_number;
 }
 
 Mesh read_model(const std::string& file) {
   Mesh mesh;
   const ElementBlock quads = elements_of_type(kQuad8, 2, -1, file);
   if (quads.tags.empty())
-    throw UserError(fmt::format("{}: no surface elements; mesh the surfaces with 8-node quadrilaterals", file));
+    throw UserError(
+        fmt::format("{}: no surface elements; mesh the surfaces with 8-node quadrilaterals, and where there are "
+                    "physical curves give the surfaces a Physical Surface(\"name\") too, or Gmsh does not save them",
+                    file));
+  const MshGroups given = read_msh_groups(file);
   const std::map<std::size_t, int> number = read_nodes(quads, file, mesh);
-  std::map<std::size_t, int> element_number;
-  for (std::size_t q = 0; q < quads.tags.size(); ++q) {
-    std::array<int, 8> nodes{};
-    for (int a = 0; a < 8; ++a) nodes[a] = number.at(quads.nodes[8 * q + a]);
-    element_number[quads.tags[q]] = static_cast<int>(mesh.elements.size());
-    mesh.elements.push_back(oriented(nodes, mesh));
-  }
+  const std::map<std::size_t, int> element_number = read_elements(quads, number, mesh);
+  refuse_gaps(mesh, file);
   const std::multimap<int, Side> sides = sides_by_middle(mesh);
   gmsh::vectorpair groups;
   gmsh::model::getPhysicalGroups(groups);
   for (const auto& [dim, tag] : groups) {
     if (dim == 1) {
-      const std::string name = group_name(dim, tag, file);
-      mesh.edges[name] = sides_of_curve(tag, name, file, number, sides);
+      const std::string name = group_name(dim, tag, given, file);
+      add_sides_of_curve(tag, name, file, given, number, sides, mesh.edges[name]);
     } else if (dim == 2) {
-      std::vector<int>& region = mesh.regions[group_name(dim, tag, file)];
-      for (int entity : group_entities(dim, tag)) {
-        for (std::size_t q : elements_of_type(kQuad8, 2, entity, file).tags) region.push_back(element_number.at(q));
+      std::vector<int>& region = mesh.regions[group_name(dim, tag, given, file)];
+      for (int entity : group_entities(2, tag)) {
+        for (std::size_t element : elements_of_type(kQuad8, 2, entity, file).tags)
+          if (is_in_group(element, tag, given)) region.push_back(element_number.at(element));
       }
       std::sort(region.begin(), region.end());
+      region.erase(std::unique(region.begin(), region.end()), region.end());
     }
+  }
+  for (auto& [name, edge] : mesh.edges) {
+    if (edge.empty())
+      throw UserError(
+          fmt::format("{}: physical curve '{}' has no lines; mesh the curve, or remove the group", file, name));
+    edge = in_order(edge);
   }
   return mesh;
 }
@@ -182,7 +231,11 @@ void generate(const std::string& file) {
   gmsh::option::getNumber("Mesh.Algorithm", algorithm);
   if (algorithm == kQuadFrontal)  // Gmsh 4.8 dies of a segmentation fault in it
     throw UserError(fmt::format("{}: Mesh.Algorithm = 8 is not safe in Gmsh 4.8; choose 5 or 6 and recombine", file));
+  gmsh::option::setNumber("General.AbortOnError", 1);  // it throws within functions that must not throw
   gmsh::model::mesh::generate(2);
+  std::string error;
+  gmsh::logger::getLastError(error);
+  if (!error.empty()) throw error;  // as the rest of Gmsh does
 }
 
 }  // namespace

@@ -1,14 +1,13 @@
 #include "checkpoint.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <stdexcept>
 #include <string_view>
 #include <unordered_map>
 
+#include "disk_file.hpp"
 #include "errors.hpp"
 #include "hdf5_file.hpp"
 
@@ -35,8 +34,18 @@ SavedStates read_states(const Hdf5File& h5) {
   return states;
 }
 
+std::uint64_t size_of(const Checkpoint& checkpoint) {
+  std::uint64_t bytes = 4 * checkpoint.states.size() + checkpoint.case_text.size();
+  for (const auto& [name, values] : checkpoint.arrays) bytes += 8 * values.size();
+  std::unordered_map<std::string_view, int> distinct;
+  for (const std::string& state : checkpoint.states)
+    if (distinct.emplace(state, 0).second) bytes += state.size();
+  return bytes;
+}
+
 void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint) {
   Hdf5File h5(file, Hdf5File::Mode::create);
+  h5.reserve(size_of(checkpoint), checkpoint.arrays.size() + checkpoint.states.size() + checkpoint.versions.size() + 8);
   h5.set_attribute("/", "step", checkpoint.step);
   h5.set_attribute("/", "time", checkpoint.time);
   h5.set_attribute("/", "dt", checkpoint.dt);
@@ -49,15 +58,9 @@ void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint)
     h5.write(group + "/values", values, {values.size()});
     h5.set_attribute(group, "name", name);
   }
+  if (!checkpoint.case_text.empty()) h5.write_bytes("/case", checkpoint.case_text);
   write_states(h5, checkpoint.states);
-}
-
-/// The file's bytes are on the disk when this returns: only then may it take the place of the old one.
-void synchronise(const std::filesystem::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY);
-  if (descriptor < 0) throw std::runtime_error(fmt::format("{}: cannot be synchronised", file.string()));
-  fsync(descriptor);
-  close(descriptor);
+  h5.finish();
 }
 
 void refuse_other_case(const std::filesystem::path& file, const Hdf5File& h5, const std::string& case_hash) {
@@ -103,9 +106,14 @@ Checkpoint read_contents(const Hdf5File& h5) {
 void write_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint) {
   std::filesystem::path beside = file;
   beside += ".new";
-  write_file(beside, checkpoint);
-  synchronise(beside);
-  std::filesystem::rename(beside, file);
+  try {
+    write_file(beside, checkpoint);
+    put_in_place(beside, file);
+  } catch (const DiskError&) {
+    std::error_code ignored;
+    std::filesystem::remove(beside, ignored);
+    throw;
+  }
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& file, const std::string& case_hash,

@@ -18,6 +18,7 @@ struct Checkpoint {
   SavedStates states;  ///< committed states of the material points
   std::string case_hash;
   std::map<std::string, std::string> versions;  ///< such as {"yade", "2023.02a"}; the states are readable by these only
+  std::string case_text = {};                   ///< comparable_toml of the case, for saying what differs; not read back
 };
 
 /// Writes the checkpoint beside `file` and renames it: `file` is always a whole checkpoint, the old one or the new one.

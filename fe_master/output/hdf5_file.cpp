@@ -4,9 +4,14 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <functional>
 #include <numeric>
 #include <utility>
+
+#include "disk_file.hpp"
+#include "errors.hpp"
 
 namespace femxdem {
 namespace {
@@ -44,6 +49,7 @@ hid_t string_type(std::size_t length) {
 }  // namespace
 
 Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file) {
+  H5dont_atexit();  // at the end of the program it would write again what could not be written
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are exceptions, not text on stderr
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access, false, true);
@@ -53,11 +59,35 @@ Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file) {
   } else {
     id_ = H5Fopen(name.c_str(), mode == Mode::read ? H5F_ACC_RDONLY : H5F_ACC_RDWR, access);
   }
-  if (id_ < 0) fail(mode == Mode::create ? "cannot create the file" : "cannot open the file as HDF5", "/");
+  if (id_ < 0 && mode == Mode::create) fail_to_write("create the file", "/");
+  if (id_ < 0) fail("cannot open the file as HDF5", "/");
 }
 
 Hdf5File::~Hdf5File() {
-  if (id_ >= 0) H5Fclose(id_);
+  if (id_ >= 0 && !broken_) H5Fclose(id_);
+}
+
+void Hdf5File::reserve(std::uint64_t bytes, std::size_t data_sets) {
+  constexpr std::uint64_t kTables = 1024, kFile = 16384;  // header and place in its group: 630 bytes as measured
+  try {
+    reserve_space(file_, bytes + kTables * data_sets + kFile);
+  } catch (const DiskError&) {
+    broken_ = true;
+    throw;
+  }
+}
+
+void Hdf5File::finish() {
+  if (H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0) fail_to_write("write", "/");
+  const hid_t id = std::exchange(id_, -1);
+  if (H5Fclose(id) < 0) fail_to_write("close", "/");
+}
+
+void Hdf5File::fail_to_write(std::string_view what, std::string_view path) {
+  const int reason = errno;
+  broken_ = true;
+  throw DiskError(fmt::format("{}: cannot {} ({}): {}", file_.string(), what, path,
+                              reason != 0 ? std::strerror(reason) : "refused by HDF5"));
 }
 
 void Hdf5File::fail(std::string_view what, std::string_view path) const {
@@ -72,9 +102,9 @@ void Hdf5File::write_raw(const std::string& path, const void* values, std::size_
   const Handle space(H5Screate_simple(static_cast<int>(lengths.size()), lengths.data(), nullptr), H5Sclose);
   const Handle links(creation_of_missing_groups(), H5Pclose);
   const Handle set(H5Dcreate2(id_, path.c_str(), file_type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
-  if (set < 0) fail("cannot create the data set", path);
+  if (set < 0) fail_to_write("create the data set", path);
   if (count > 0 && H5Dwrite(set, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
-    fail("cannot write the data set; is the disk full?", path);
+    fail_to_write("write the data set", path);
   }
 }
 
@@ -93,11 +123,11 @@ void Hdf5File::write_bytes(const std::string& path, std::string_view bytes) {
 void Hdf5File::make_group(const std::string& path) {
   const Handle links(creation_of_missing_groups(), H5Pclose);
   const Handle group(H5Gcreate2(id_, path.c_str(), links, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-  if (group < 0) fail("cannot create the group", path);
+  if (group < 0) fail_to_write("create the group", path);
 }
 
 void Hdf5File::remove(const std::string& path) {
-  if (H5Ldelete(id_, path.c_str(), H5P_DEFAULT) < 0) fail("cannot remove", path);
+  if (H5Ldelete(id_, path.c_str(), H5P_DEFAULT) < 0) fail_to_write("remove", path);
 }
 
 void Hdf5File::set_scalar(const std::string& group, const std::string& name, const void* value, std::int64_t type) {
@@ -105,7 +135,7 @@ void Hdf5File::set_scalar(const std::string& group, const std::string& name, con
   const Handle attribute(
       H5Acreate_by_name(id_, group.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
-  if (attribute < 0 || H5Awrite(attribute, type, value) < 0) fail("cannot write attribute " + name, group);
+  if (attribute < 0 || H5Awrite(attribute, type, value) < 0) fail_to_write("write attribute " + name, group);
 }
 
 void Hdf5File::set_attribute(const std::string& group, const std::string& name, double value) {

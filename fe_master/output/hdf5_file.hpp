@@ -17,8 +17,9 @@ struct Hdf5Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An HDF5 file, open as long as the object lives. Every failure is an Hdf5Error that names file and data set.
-/// Paths inside the file start with '/'; missing groups on the way are made.
+/// An HDF5 file, open as long as the object lives. A failure to read is an Hdf5Error that names file and data set, one
+/// to write a DiskError with the system's reason; HDF5 does not survive a full disk, so space is reserved before. Paths
+/// inside the file start with '/'; missing groups on the way are made.
 class Hdf5File {
  public:
   enum class Mode { create, read, update };  ///< create truncates; read and update want an existing file
@@ -28,6 +29,11 @@ class Hdf5File {
   ~Hdf5File();
   Hdf5File(const Hdf5File&) = delete;
   Hdf5File& operator=(const Hdf5File&) = delete;
+
+  /// Makes sure that the file can grow by data sets of so many bytes in all, names and tables included.
+  void reserve(std::uint64_t bytes, std::size_t data_sets);
+  /// Puts everything with the system and closes; without it a failure to do so goes unnoticed.
+  void finish();
 
   /// New data set of the given shape, row-major; values.size() is the product of the shape.
   void write(const std::string& path, std::span<const double> values, const Shape& shape);
@@ -57,12 +63,14 @@ class Hdf5File {
 
  private:
   [[noreturn]] void fail(std::string_view what, std::string_view path) const;
+  [[noreturn]] void fail_to_write(std::string_view what, std::string_view path);
   void write_raw(const std::string& path, const void* values, std::size_t count, const Shape& shape,
                  std::int64_t memory_type, std::int64_t file_type);
   void set_scalar(const std::string& group, const std::string& name, const void* value, std::int64_t type);
 
   std::filesystem::path file_;
   std::int64_t id_ = -1;
+  bool broken_ = false;  ///< a write failed: HDF5 must not touch the file again
 };
 
 }  // namespace femxdem

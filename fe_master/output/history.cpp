@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
-#include <stdexcept>
+#include <fstream>
 
 #include "errors.hpp"
 
@@ -38,10 +38,10 @@ std::string kept_rows(const std::filesystem::path& file, const std::string& expe
 
 History::History(const std::filesystem::path& file, const std::vector<std::string>& monitors, Existing existing,
                  int last_step)
-    : file_(file), monitors_(monitors.size()) {
+    : monitors_(monitors.size()) {
   const bool goes_on = existing == Existing::resume && std::filesystem::exists(file);
   replace_file(file, goes_on ? kept_rows(file, header(monitors), last_step) : header(monitors));
-  stream_.open(file, std::ios::app);
+  stream_.emplace(file, true);
 }
 
 void History::add(const StepRecord& record) {
@@ -51,8 +51,7 @@ void History::add(const StepRecord& record) {
                   record.iterations, record.evaluations, record.dem_steps, record.histories, record.residual);
   for (const double value : record.monitors) row += fmt::format(",{:.17g}", value);
   row += fmt::format(",{:.6g},{:.6g}\n", record.dem_seconds, record.wall_seconds);
-  stream_ << row << std::flush;
-  if (!stream_) throw std::runtime_error(fmt::format("{}: cannot be written; is the disk full?", file_.string()));
+  stream_->write(row);
 }
 
 }  // namespace femxdem

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,9 +35,8 @@ class History {
   void add(const StepRecord& record);
 
  private:
-  std::filesystem::path file_;
   std::size_t monitors_;
-  std::ofstream stream_;
+  std::optional<AppendedFile> stream_;
 };
 
 }  // namespace femxdem

@@ -4,8 +4,21 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 
 namespace femxdem {
+namespace {
+
+/// Whether a line of progress can be written over. Under mpirun, standard output is a terminal of mpirun's own, whose
+/// text goes who knows where; a scheduler's job writes to a file.
+bool shows_updates(std::FILE* terminal) {
+  for (const char* batch : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_JOB_ID", "PBS_JOBID", "LSB_JOBID", "JOB_ID"})
+    if (std::getenv(batch) != nullptr) return false;
+  const char* kind = std::getenv("TERM");
+  return isatty(fileno(terminal)) == 1 && kind != nullptr && std::string_view(kind) != "dumb";
+}
+
+}  // namespace
 
 std::string readable_duration(double seconds) {
   if (!std::isfinite(seconds)) return "unknown";
@@ -15,26 +28,29 @@ std::string readable_duration(double seconds) {
 }
 
 Log::Log(const std::filesystem::path& file, Existing existing, std::FILE* terminal)
-    : stream_(file, existing == Existing::resume ? std::ios::app : std::ios::trunc),
-      terminal_(terminal),
-      updates_(isatty(fileno(terminal)) == 1) {}
+    : stream_(file, existing == Existing::resume), terminal_(terminal), updates_(shows_updates(terminal)) {}
 
 Log::~Log() { end_progress_line(); }
 
 void Log::end_progress_line() {
-  if (line_is_open_) fmt::print(terminal_, "\n");
+  if (line_is_open_) print("\n");
   line_is_open_ = false;
   std::fflush(terminal_);
 }
 
 void Log::say(std::string_view line) {
   end_progress_line();
-  fmt::print(terminal_, "{}\n", line);
-  std::fflush(terminal_);
+  print(fmt::format("{}\n", line));
   note(line);
 }
 
-void Log::note(std::string_view line) { stream_ << line << std::endl; }
+void Log::note(std::string_view line) { stream_.write(fmt::format("{}\n", line)); }
+
+/// A terminal that cannot be written stops no run.
+void Log::print(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), terminal_);
+  std::fflush(terminal_);
+}
 
 double Log::seconds_left(double done) {
   const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
@@ -56,8 +72,7 @@ void Log::step(const StepRecord& record, std::span<const IterationRecord> iterat
       record.step, record.time, record.load_factor, record.iterations, record.evaluations, record.residual,
       record.dem_seconds, left);
   if (!updates_) return say(line);
-  fmt::print(terminal_, "\r{}\033[K", line);
-  std::fflush(terminal_);
+  print(fmt::format("\r{}\033[K", line));
   line_is_open_ = true;
   note(line);
 }

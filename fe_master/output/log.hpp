@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,7 +24,8 @@ struct IterationRecord {
 };
 
 /// What the run says: everything goes to log.txt, the essential also to the terminal. A terminal shows the progress on
-/// one line that updates; a batch log gets one plain line for each step.
+/// one line that updates; a batch log gets one plain line for each step. Throws DiskError where log.txt cannot be
+/// written.
 class Log {
  public:
   /// With Existing::resume the text of the earlier run is kept.
@@ -47,7 +47,9 @@ class Log {
   double seconds_left(double done);
   void end_progress_line();
 
-  std::ofstream stream_;
+  void print(std::string_view text);
+
+  AppendedFile stream_;
   std::FILE* terminal_;
   bool updates_;  ///< the terminal can rewrite its line
   bool line_is_open_ = false;

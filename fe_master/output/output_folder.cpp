@@ -4,9 +4,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 #include <system_error>
 
 #include "errors.hpp"
@@ -25,16 +26,18 @@ void remove_results(const fs::path& folder) {
 
 }  // namespace
 
-void prepare_output_folder(const fs::path& folder, Existing existing) {
-  std::error_code error;
+std::unique_ptr<FolderLock> prepare_output_folder(const fs::path& folder, Existing existing) {
+  std::error_code error, cannot_ask;
   fs::create_directories(folder, error);
-  if (!fs::is_directory(folder)) {
+  if (!fs::is_directory(folder, cannot_ask)) {
     throw UserError(fmt::format("{}: cannot be made a folder ({}); choose another --out", folder.string(),
                                 error ? error.message() : "a file of that name exists"));
   }
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw UserError(fmt::format("{}: the folder cannot be written; choose another --out", folder.string()));
+    throw UserError(fmt::format("{}: the folder cannot be written ({}); choose another --out", folder.string(),
+                                std::strerror(errno)));
   }
+  auto lock = std::make_unique<FolderLock>(folder);
   if (existing == Existing::overwrite) remove_results(folder);
   const bool holds_results = fs::exists(folder / "history.csv") || fs::exists(folder / "results.h5");
   if (existing == Existing::refuse && holds_results) {
@@ -43,22 +46,13 @@ void prepare_output_folder(const fs::path& folder, Existing existing) {
                     "choose another --out",
                     folder.string()));
   }
+  return lock;
 }
 
 std::string read_file(const fs::path& file) {
   std::ostringstream text;
   text << std::ifstream(file, std::ios::binary).rdbuf();
   return text.str();
-}
-
-void replace_file(const fs::path& file, std::string_view text) {
-  fs::path beside = file;
-  beside += ".new";
-  std::ofstream stream(beside, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written; is the disk full?", beside.string()));
-  fs::rename(beside, file);
 }
 
 }  // namespace femxdem

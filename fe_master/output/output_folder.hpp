@@ -1,8 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
-#include <string_view>
+
+#include "disk_file.hpp"
+#include "folder_lock.hpp"
 
 namespace femxdem {
 
@@ -13,14 +16,12 @@ enum class Existing {
   resume,     ///< a restart goes on with them
 };
 
-/// Makes the folder where it is missing, and its parents. Throws UserError where it cannot be made or written, and
-/// where it holds results and `existing` refuses them.
-void prepare_output_folder(const std::filesystem::path& folder, Existing existing);
+/// Makes the folder where it is missing, and its parents, and locks it for as long as the lock lives. Throws UserError
+/// where it cannot be made or written, where another run writes into it, and where it holds results and `existing`
+/// refuses them.
+std::unique_ptr<FolderLock> prepare_output_folder(const std::filesystem::path& folder, Existing existing);
 
 /// The bytes of a file; empty where there is none.
 std::string read_file(const std::filesystem::path& file);
-
-/// Writes beside `file` and renames: a reader sees the old text or the new one, never half of it.
-void replace_file(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace femxdem

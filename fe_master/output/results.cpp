@@ -103,8 +103,12 @@ Results::Results(const std::filesystem::path& folder, const Mesh& mesh, std::spa
 
 void Results::create(const Mesh& mesh, std::span<const Point2> points) {
   Hdf5File h5(folder_ / kFile, Hdf5File::Mode::create);
+  std::uint64_t bytes = 64 * mesh.nodes.size() + 64 * mesh.elements.size() + 16 * points.size();
+  for (const auto& [name, members] : mesh.regions) bytes += 4 * members.size();
+  h5.reserve(bytes, 8 + mesh.regions.size());
   write_mesh(h5, mesh, points);
   h5.make_group("/steps");
+  h5.finish();
 }
 
 void Results::resume(int last_step) {
@@ -116,12 +120,17 @@ void Results::resume(int last_step) {
       grids_[std::stoi(step)] = grid(h5, step);
     }
   }
+  h5.finish();
 }
 
 void Results::write(const FieldStep& step) {
   {
     Hdf5File h5(folder_ / kFile, Hdf5File::Mode::update);
     const std::string group = group_of(step.step);
+    std::uint64_t bytes = 0;
+    for (const Field& field : step.node_fields) bytes += 12 * field.values.size();  // two components become three
+    for (const Field& field : step.point_fields) bytes += 16 * field.values.size();
+    h5.reserve(bytes, 4 + step.node_fields.size() + 2 * step.point_fields.size());
     if (h5.exists(group)) h5.remove(group);
     h5.make_group(group);
     h5.set_attribute(group, "step", step.step);
@@ -137,6 +146,7 @@ void Results::write(const FieldStep& step) {
       h5.write(group + "/cells/" + field.name, element_means(field, elements_), {elements_, field.components});
     }
     grids_[step.step] = grid(h5, fmt::format("{:06d}", step.step));
+    h5.finish();
   }
   write_xdmf();
 }

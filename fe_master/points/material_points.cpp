@@ -24,4 +24,9 @@ void commit(MaterialPoints& points, std::span<Response> responses) {
   for (std::size_t i = 0; i < reports.size(); ++i) responses[i].report = reports[i];
 }
 
+std::string describe(const Failure& failure) {
+  const bool stops = failure.sentence.empty() || failure.sentence.back() == '.';
+  return failure.sentence + (stops ? " " : ". ") + failure.advice;
+}
+
 }  // namespace femxdem

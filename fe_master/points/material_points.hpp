@@ -50,6 +50,9 @@ struct Failure {
   std::string advice;     ///< what to try
 };
 
+/// Both as sentences.
+std::string describe(const Failure& failure);
+
 /// Answer of one material point to one trial; NaN until written, so that a forgotten entry cannot pass.
 struct Response {
   Tensor2 stress = Tensor2::Constant(std::numeric_limits<double>::quiet_NaN());     ///< Cauchy [Pa], tension positive

@@ -20,6 +20,8 @@ struct VeParameters {
   std::string script;                  ///< user's YADE script, absolute path
   std::string scene;                   ///< saved YADE scene, absolute path
   std::vector<std::string> arguments;  ///< command-line arguments of the script
+  int script_steps = 1'000'000;        ///< DEM steps after which the script is stopped
+  double script_seconds = 600.0;       ///< the same, for a script that makes no steps [s]
   int spheres = 1000;
   double size_ratio = 1.5;                        ///< largest over smallest diameter [-]
   double kappa = 500.0;                           ///< k_n / (sigma_0 a) [-]

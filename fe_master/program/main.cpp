@@ -1,7 +1,9 @@
 // femxdem: boundary value problems of granular materials, finite elements with volume elements of spheres.
+#include <fcntl.h>
 #include <mpi.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -14,6 +16,7 @@
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
+#include "output_folder.hpp"
 #include "time_loop.hpp"
 #include "ve_commands.hpp"
 #include "ve_templates.hpp"
@@ -33,6 +36,7 @@ struct Arguments {
   bool restart = false;
   bool overwrite = false;
   int noise_samples = 0;
+  int compare = 0;
   std::string command_line;
 };
 
@@ -64,6 +68,12 @@ struct Mpi {
   int of_machine = 1;  ///< ranks that share this machine's processors
 };
 
+/// Opens what is closed of 0, 1 and 2, as batch systems leave it: else the next files would take their places.
+void keep_standard_descriptors() {
+  for (int descriptor = 0; descriptor < 3; ++descriptor)
+    if (fcntl(descriptor, F_GETFD) < 0) open("/dev/null", O_RDWR);
+}
+
 /// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
 bool speaks() {
   const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
@@ -89,7 +99,7 @@ RunOptions run_options(const Case& c, const Arguments& arguments) {
 }
 
 VeArguments ve_arguments(const Arguments& arguments) {
-  return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.noise_samples};
+  return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.compare, arguments.noise_samples};
 }
 
 /// Trials that a run will ask of its volume elements, about: three evaluations a step.
@@ -111,12 +121,17 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
     serve(MPI_COMM_WORLD, *local_points(static_cast<EngineKind>(*engine)));
     return kDone;
   }
-  const Problem::Start start = problem.volume_elements();
+  Problem::Start start = problem.volume_elements();
   std::vector<std::string> templates;
   EngineVerdict verdict;
   try {
+    options.lock = prepare_output_folder(options.folder, options.existing);
+    for (VeParameters& setup : start.templates) setup.cache = writable_cache(setup, options.folder);
     PythonVolumeElements maker(worker, ve_options(ve));
-    templates = make_templates(maker, start.templates, [](std::string_view line) { std::cout << line << std::endl; });
+    templates = make_templates(maker, start.templates, [&](std::string_view line) {
+      std::cout << line << std::endl;
+      options.remarks.emplace_back(line);
+    });
     options.versions.merge(engine_versions(maker));
     verdict = choose_engine(ve.engine, worker, templates);
   } catch (...) {
@@ -165,6 +180,8 @@ int check(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace femxdem;
+  keep_standard_descriptors();
+  std::signal(SIGXFSZ, SIG_IGN);                                         // a limit on files' sizes is an error of write
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
   Arguments arguments;
   for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
@@ -202,6 +219,13 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(3, 1000));
   CLI::App* prepare_command = ve_command->add_subcommand("prepare", "Make the volume elements of a case");
   add_case(prepare_command);
+  prepare_command->add_option("--out", arguments.folder, "Folder of the packings (default: ve.cache, else packings)");
+  prepare_command
+      ->add_option(
+          "--compare", arguments.compare,
+          "Make them anew, each beside so many DEM steps of the scene's own continuation in YADE; the manifest and "
+          "the notes tell the difference")
+      ->check(CLI::Range(1, 1000000));
   CLI::App* inspect_command =
       ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");
   add_case(inspect_command);
@@ -222,6 +246,9 @@ int main(int argc, char** argv) {
   } catch (const UserError& error) {
     if (speaks()) std::cerr << error.what() << "\n";
     return kBadInput;
+  } catch (const DiskError& error) {
+    std::cerr << error.what() << "\n";
+    return kNotWritten;
   } catch (const std::exception& error) {
     std::cerr << "femxdem: " << error.what() << "\n";
     return kPointFailed;

@@ -10,6 +10,7 @@
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
+#include "output_folder.hpp"
 #include "path.hpp"
 #include "ve_templates.hpp"
 
@@ -56,7 +57,13 @@ double expected_trials(const Case& c) {
 int path_of_volume_element(const Case& c, VeArguments& arguments) {
   WorkerProcess worker(worker_command(c.ve));
   PythonVolumeElements maker(worker, ve_options(c.ve));
-  const std::string state = make_templates(maker, {single_ve(c)}, say).front();
+  arguments.options.lock = prepare_output_folder(arguments.options.folder, arguments.options.existing);
+  VeParameters ve = single_ve(c);
+  ve.cache = writable_cache(ve, arguments.options.folder);
+  const std::string state = make_templates(maker, {ve}, [&](std::string_view line) {
+                              say(line);
+                              arguments.options.remarks.emplace_back(line);
+                            }).front();
   arguments.options.versions.merge(engine_versions(maker));
   const EngineVerdict verdict = choose_engine(c.ve.engine, worker, {state});
   arguments.options.remarks.push_back(verdict.sentence);
@@ -98,6 +105,7 @@ int run_program(std::vector<std::string> words) {
   if (pid == 0) {
     setenv("PYTHONPATH", FEMXDEM_PYTHON_MODULES, 1);
     setenv("OMP_NUM_THREADS", "1", 1);
+    setenv("HOME", "/tmp", 0);  // Matplotlib looks for it
     execv(arguments[0], arguments.data());
     _exit(127);
   }
@@ -118,10 +126,12 @@ int ve_path(VeArguments arguments) {
 
 int ve_prepare(const VeArguments& arguments) {
   refuse_ranks();
-  const std::vector<VeParameters> pool = pool_of(arguments);
+  std::vector<VeParameters> pool = pool_of(arguments);
+  if (!arguments.options.folder.empty())
+    for (VeParameters& ve : pool) ve.cache = arguments.options.folder.string();
   WorkerProcess worker({});
   PythonVolumeElements elements(worker, ve_options(pool.front()));
-  make_templates(elements, pool, say);
+  make_templates(elements, pool, say, arguments.compare);
   for (const VeParameters& ve : pool)
     std::cout << std::ifstream(template_files(elements, ve).manifest).rdbuf() << std::endl;
   return kDone;
@@ -136,10 +146,17 @@ int ve_inspect(const VeArguments& arguments) {
     if (folder.empty()) folder = default_folder(c, "_ve");
     WorkerProcess worker({});
     PythonVolumeElements elements(worker, ve_options(c.ve));
-    make_templates(elements, {single_ve(c)}, say);
-    state = template_files(elements, single_ve(c)).state;
+    VeParameters ve = single_ve(c);
+    ve.cache = writable_cache(ve, folder);
+    make_templates(elements, {ve}, say);
+    state = template_files(elements, ve).state;
   }
   if (!fs::is_regular_file(state)) throw UserError(fmt::format("{}: no such file; correct the path", state.string()));
+  if (state.extension() != ".state")
+    throw UserError(
+        fmt::format("{}: neither a case (.toml) nor a prepared volume element (.state); for a script or a scene, "
+                    "give the case that names it",
+                    state.string()));
   if (folder.empty()) folder = "out" / state.stem();
   const fs::path script = fs::path(FEMXDEM_YADE_SCRIPTS) / "inspect_ve.py";
   return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});

@@ -12,6 +12,7 @@ struct VeArguments {
   std::string file;                    ///< case file, or a prepared state (inspect)
   std::vector<std::string> overrides;  ///< section.key=value
   RunOptions options;                  ///< folder: where the results go, empty: the command's default
+  int compare = 0;                     ///< prepare: DEM steps beside the scene's own continuation in YADE
   int noise_samples = 0;               ///< path: probes of the stress's jitter in each step
 };
 

@@ -1,12 +1,20 @@
 #include "ve_templates.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <optional>
 #include <regex>
 
+#include "errors.hpp"
 #include "hash.hpp"
+#include "manifest.hpp"
 #include "output_folder.hpp"
 
 namespace femxdem {
@@ -31,6 +39,60 @@ std::map<std::string, std::string> parse_strings(const std::string& json) {
   return values;
 }
 
+/// One line on what a manifest says, with its list; nothing where that is empty.
+void say_list(std::string_view title, const std::vector<std::string>& texts,
+              const std::function<void(std::string_view)>& say) {
+  if (!texts.empty()) say(fmt::format("  {}: {}", title, fmt::join(texts, "; ")));
+}
+
+void say_manifest(const std::string& manifest, const std::function<void(std::string_view)>& say) {
+  say_list("dropped", manifest_texts(manifest, "dropped"), say);
+  if (manifest_texts(manifest, "source") != std::vector<std::string>{"prepare"})
+    say_list("reset", manifest_texts(manifest, "reset"), say);
+  say_list("note", manifest_texts(manifest, "notes"), say);
+}
+
+/// Refuses a volume element that is not at rest where it starts: what follows would be its settling, not its stress.
+void refuse_unrest(const std::string& manifest, const VeParameters& ve, const fs::path& file) {
+  const double unbalanced = manifest_number(manifest, "unbalanced_force").value_or(0.0);
+  if (unbalanced <= ve.max_unbalanced_force) return;
+  throw UserError(
+      fmt::format("{}: the volume element is not at rest as it was made: unbalanced force {:.1e}, limit {:.1e} "
+                  "(ve.max_unbalanced_force); let the scene come to rest before its script ends, as by running until "
+                  "unbalancedForce() < 0.01",
+                  file.string(), unbalanced, ve.max_unbalanced_force));
+}
+
+/// State and manifest of the cache where they are whole and of now; else what is wrong with them, empty where they are
+/// not there.
+struct Cached {
+  std::optional<PythonVolumeElements::Template> made;
+  std::string reason;
+};
+
+Cached look_up(const TemplateFiles& files) {
+  std::error_code error;
+  if (!fs::exists(files.state, error) || !fs::exists(files.manifest, error)) return {};
+  PythonVolumeElements::Template made{read_file(files.state), read_file(files.manifest)};
+  const std::vector<std::string> print = manifest_texts(made.manifest, "state");
+  if (!print.empty() && print.front() != fingerprint(made.state))
+    return {std::nullopt, files.state.string() + " is damaged"};
+  if (std::string change = changed_input(made.manifest); !change.empty()) return {std::nullopt, std::move(change)};
+  return {std::move(made), {}};
+}
+
+void store(const TemplateFiles& files, const PythonVolumeElements::Template& made) {
+  const fs::path folder = files.state.parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || access(folder.c_str(), W_OK | X_OK) != 0)
+    throw UserError(
+        fmt::format("the packing cannot be stored in {} ({}); give another ve.cache, a folder that can be written",
+                    folder.string(), error ? error.message() : std::strerror(errno)));
+  replace_file(files.manifest, made.manifest);
+  replace_file(files.state, made.state);
+}
+
 }  // namespace
 
 std::string makers(const fs::path& scripts) {
@@ -44,31 +106,47 @@ std::string makers(const fs::path& scripts) {
   return all;
 }
 
+fs::path packings_folder(const VeParameters& ve) {
+  return ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
+}
+
+std::string writable_cache(const VeParameters& ve, const fs::path& results) {
+  if (!ve.cache.empty() || results.empty()) return ve.cache;
+  const fs::path usual = packings_folder(ve);
+  std::error_code error;
+  const bool there = fs::exists(usual, error);
+  const bool writable = access(there ? usual.c_str() : ".", W_OK | X_OK) == 0;
+  return writable ? ve.cache : (results / "packings").string();
+}
+
 TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve) {
-  const fs::path folder = ve.cache.empty() ? fs::path("packings") : fs::path(ve.cache);
+  const fs::path folder = packings_folder(ve);
   const std::string name = key_of(ve, ve_spec_json(ve), elements.versions());
   return {folder / (name + ".state"), folder / (name + ".json")};
 }
 
 std::vector<std::string> make_templates(PythonVolumeElements& elements, const std::vector<VeParameters>& pool,
-                                        const std::function<void(std::string_view)>& say) {
+                                        const std::function<void(std::string_view)>& say, int compare) {
   std::vector<std::string> states;
   for (const VeParameters& ve : pool) {
-    const auto [state, manifest] = template_files(elements, ve);
-    if (fs::exists(state) && fs::exists(manifest)) {
-      states.push_back(read_file(state));
-      say(fmt::format("volume element {} of {}: {}", states.size(), pool.size(), state.string()));
-      continue;
+    const TemplateFiles files = template_files(elements, ve);
+    const std::string which = fmt::format("volume element {} of {}", states.size() + 1, pool.size());
+    Cached cached = compare > 0 ? Cached{} : look_up(files);
+    if (!cached.reason.empty()) say(fmt::format("{}: {}; made anew", which, cached.reason));
+    if (cached.made) {
+      say(fmt::format("{}: {}", which, files.state.string()));
+    } else {
+      const auto start = std::chrono::steady_clock::now();
+      std::string specification = ve_spec_json(ve);
+      if (compare > 0) specification.insert(1, fmt::format("\"compare\": {}, ", compare));
+      cached.made = elements.make_template(specification);
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      store(files, *cached.made);
+      say(fmt::format("{}: made in {:.1f} s, {}", which, seconds, files.state.string()));
     }
-    const auto start = std::chrono::steady_clock::now();
-    const auto made = elements.make_template(ve_spec_json(ve));
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    fs::create_directories(state.parent_path());
-    replace_file(manifest, made.manifest);
-    replace_file(state, made.state);
-    states.push_back(made.state);
-    say(fmt::format("volume element {} of {}: made in {:.1f} s, {}", states.size(), pool.size(), seconds,
-                    state.string()));
+    say_manifest(cached.made->manifest, say);
+    refuse_unrest(cached.made->manifest, ve, files.state);
+    states.push_back(std::move(cached.made->state));
   }
   return states;
 }

@@ -26,9 +26,14 @@ std::string makers(const std::filesystem::path& scripts);
 
 /// States of the volume elements that a case starts from, one per entry of `pool`: from the cache folder where they
 /// are, else prepared (or adopted from a scene or a user's script) and put there with their manifests.
-/// `say` gets one line for each.
+/// A packing of the cache is made anew where a file that its script read has changed, or where it is damaged. `say`
+/// gets a line for each, and what was dropped, reset and noted. Above 0, `compare` makes them all anew, each beside
+/// that many DEM steps of the scene's own continuation. Throws UserError where one is not at rest or cannot be stored.
 std::vector<std::string> make_templates(PythonVolumeElements& elements, const std::vector<VeParameters>& pool,
-                                        const std::function<void(std::string_view)>& say);
+                                        const std::function<void(std::string_view)>& say, int compare = 0);
+
+/// ve.cache, or where none is given and the working folder cannot be written a folder in that of the results.
+std::string writable_cache(const VeParameters& ve, const std::filesystem::path& results);
 
 /// Versions of YADE and of its Python.
 std::map<std::string, std::string> engine_versions(PythonVolumeElements& elements);

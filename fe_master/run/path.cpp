@@ -91,6 +91,9 @@ int Path::go() {
                       files_.summary.steps, 100 * (record_.time - static_cast<double>(s)), s + 1,
                       options_.folder.string(), last_.reason));
     }
+  } catch (const DiskError& error) {
+    throw DiskError(
+        fmt::format("{}; the last whole step is {}; make room and start again", error.what(), files_.summary.steps));
   } catch (const std::exception& error) {
     files_.finish(kPointFailed, error.what());
     throw;
@@ -212,7 +215,6 @@ std::unique_ptr<MaterialPoints> make_analytic_point(const Case& c) {
 }
 
 int follow_path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples) {
-  prepare_output_folder(options.folder, options.existing);
   return Path(c, point, options, noise_samples).go();
 }
 

@@ -69,7 +69,7 @@ PathDriver::PathDriver(MaterialPoints& point, const SolverParameters& parameters
 void PathDriver::begin_segment(const PathSegment& segment) {
   point_.begin_step();
   response_ = point_.evaluate(std::array{F_}, Operator::elastic).front();
-  if (response_.failure) throw UserError(response_.failure->sentence + " " + response_.failure->advice);
+  if (response_.failure) throw UserError(describe(*response_.failure));
   R_ = polar_decomposition(F_).R;
   tangent_.emplace(
       rotate(response_.stiffness, R_.transpose()), kAllComponents,

@@ -5,13 +5,16 @@
 namespace femxdem {
 
 RunFiles::RunFiles(const Case& c, const RunOptions& options)
-    : log(options.folder / "log.txt", options.existing), options_(options) {
+    : lock_(options.lock ? options.lock : prepare_output_folder(options.folder, options.existing)),
+      log(options.folder / "log.txt", options.existing),
+      options_(options) {
   replace_file(options.folder / "case.toml", effective_toml(c));
   summary.ranks = options.ranks;
   summary.case_hash = case_hash(c);
   summary.command_line = options.command_line;
   summary.versions = options.versions;
-  for (const std::string& remark : options.remarks) log.say(remark);
+  if (!lock_->remark().empty()) log.say(lock_->remark());
+  for (const std::string& remark : options.remarks) log.note(remark);
 }
 
 void RunFiles::begin_history(const std::vector<std::string>& columns, int last_step) {
@@ -23,6 +26,24 @@ void RunFiles::add(const StepRecord& record) {
   summary.evaluations += record.evaluations;
   summary.dem_steps += record.dem_steps;
   summary.engine_seconds += record.dem_seconds;
+}
+
+void RunFiles::whole(int last_checkpoint) {
+  whole_step_ = summary.steps;
+  last_checkpoint_ = last_checkpoint;
+}
+
+std::string RunFiles::stopped_by_the_disk(const std::string& reason, double time) {
+  const std::string state = last_checkpoint_ > 0
+                                ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
+                                : "there is no checkpoint to restart from";
+  const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again",
+                                          reason, whole_step_, time, state);
+  try {
+    finish(kNotWritten, message);
+  } catch (const DiskError&) {  // the same disk
+  }
+  return message;
 }
 
 int RunFiles::finish(int status, const std::string& message) {

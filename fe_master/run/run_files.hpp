@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,7 +25,8 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
-  std::vector<std::string> remarks;                          ///< for the beginning of the log
+  std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
+  std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 
@@ -32,7 +34,7 @@ struct RunOptions {
 /// case), history.csv and, at the end, summary.json.
 class RunFiles {
  public:
-  /// The folder is ready (prepare_output_folder). options is kept by reference.
+  /// Prepares the folder and holds its lock. options is kept by reference.
   RunFiles(const Case& c, const RunOptions& options);
 
   /// history.csv with these columns of its own; rows after last_step of an earlier run are removed.
@@ -44,6 +46,15 @@ class RunFiles {
   /// Wall time since the start [s].
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
+  /// What a full disk leaves: how the run ended, if it still finds a place. Returns the sentence.
+  std::string stopped_by_the_disk(const std::string& reason, double time);
+  /// Every file has what it should of the last step; last_checkpoint: the step of the one on the disk, 0: none.
+  void whole(int last_checkpoint);
+
+ private:
+  std::shared_ptr<FolderLock> lock_;  // before any file in the folder
+
+ public:
   Log log;
   Summary summary;
 
@@ -51,6 +62,7 @@ class RunFiles {
   const RunOptions& options_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::optional<History> history_;
+  int whole_step_ = 0, last_checkpoint_ = 0;
 };
 
 }  // namespace femxdem

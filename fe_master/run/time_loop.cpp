@@ -5,6 +5,7 @@
 #include "checkpoint.hpp"
 #include "field_output.hpp"
 #include "monitors.hpp"
+#include "restart.hpp"
 #include "step_size.hpp"
 #include "warnings.hpp"
 
@@ -41,6 +42,8 @@ class TimeLoop {
   StepSize size_;
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
+  int last_checkpoint_ = 0;  // step of the one on the disk, 0: none
+  double whole_time_ = 0;    // of the last step of which every file has what it should
 };
 
 TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed)
@@ -69,9 +72,9 @@ int TimeLoop::go() {
     restart();
   } else {
     files_.log.say(fmt::format("start: out-of-balance force {:.1e} of the loads", solver_.relative_residual(before_)));
-    write_fields();
   }
   try {
+    if (options_.existing != Existing::resume) write_fields();
     const int status = advance();
     const double time = solver_.committed().time;
     const std::string message = status == kDone
@@ -79,6 +82,8 @@ int TimeLoop::go() {
                                     : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
                                                   files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
+  } catch (const DiskError& error) {
+    throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
   } catch (const std::exception& error) {
     files_.finish(kPointFailed, error.what());
     throw;
@@ -160,6 +165,8 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   const int checkpoint_every = case_.output.checkpoint_every;
   if (checkpoint_every > 0 && files_.summary.steps % checkpoint_every == 0) write_state();
+  files_.whole(last_checkpoint_);
+  whole_time_ = now.time;
 }
 
 std::string TimeLoop::place(std::size_t point) const {
@@ -174,13 +181,15 @@ void TimeLoop::write_fields() {
 
 void TimeLoop::write_state() {
   Checkpoint checkpoint{files_.summary.steps,     solver_.committed().time, size_.size(), {}, {},
-                        files_.summary.case_hash, options_.versions};
+                        files_.summary.case_hash, options_.versions,
+                        comparable_toml(case_)};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back(
       "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
   checkpoint.states = points_.save();
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
+  last_checkpoint_ = files_.summary.steps;
   files_.log.note(fmt::format("checkpoint after step {}", files_.summary.steps));
 }
 
@@ -190,7 +199,9 @@ void TimeLoop::restart() {
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
   size_.set_size(resumed_.dt);
-  files_.summary.steps = resumed_.step;
+  files_.summary.steps = last_checkpoint_ = resumed_.step;
+  whole_time_ = resumed_.time;
+  files_.whole(last_checkpoint_);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
   files_.log.start_from(resumed_.time / case_.control.end_time);
@@ -201,11 +212,20 @@ void TimeLoop::restart() {
 }  // namespace
 
 int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options) {
-  prepare_output_folder(options.folder, options.existing);
+  RunOptions locked = options;
+  if (!locked.lock) locked.lock = prepare_output_folder(options.folder, options.existing);
   Checkpoint resumed;
-  if (options.existing == Existing::resume)
-    resumed = read_checkpoint(options.folder / "checkpoint.h5", case_hash(problem.parameters()), options.versions);
-  return TimeLoop(problem, points, options, std::move(resumed)).go();
+  if (options.existing == Existing::resume) {
+    const std::filesystem::path file = options.folder / "checkpoint.h5";
+    resumed = read_checkpoint(file, hash_of_restart(file, problem.parameters()), options.versions);
+  }
+  std::optional<TimeLoop> loop;
+  try {
+    loop.emplace(problem, points, locked, std::move(resumed));
+  } catch (const DiskError& error) {
+    throw DiskError(fmt::format("{}; no step has been made; make room and start again", error.what()));
+  }
+  return loop->go();
 }
 
 }  // namespace femxdem

@@ -48,7 +48,7 @@ Equilibrium undeformed(const Formulation& formulation, MaterialPoints& points, c
   points.begin_step();
   state.responses = points.evaluate(state.F, Operator::elastic);
   for (const Response& r : state.responses) {
-    if (r.failure) throw UserError(r.failure->sentence + " " + r.failure->advice);
+    if (r.failure) throw UserError(describe(*r.failure));
   }
   return state;
 }

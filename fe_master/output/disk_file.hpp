@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+namespace femxdem {
+
+/// A file that text is appended to; every write is with the system when it returns. All throw DiskError with the
+/// system's reason.
+class AppendedFile {
+ public:
+  /// Without `keep` the file is emptied.
+  AppendedFile(const std::filesystem::path& file, bool keep);
+  ~AppendedFile();
+  AppendedFile(const AppendedFile&) = delete;
+  AppendedFile& operator=(const AppendedFile&) = delete;
+  void write(std::string_view text);
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_;
+};
+
+/// Writes beside `file`, makes sure of the disk and renames: a reader sees the old text or the new one, never half of
+/// it, and the old one stays when the new one cannot be written.
+void replace_file(const std::filesystem::path& file, std::string_view text);
+
+/// Makes sure that `file`, which exists, can grow by so many bytes: for libraries that do not survive a full disk.
+void reserve_space(const std::filesystem::path& file, std::uint64_t bytes);
+
+/// Puts `beside` in the place of `file`, once its bytes are on the disk.
+void put_in_place(const std::filesystem::path& beside, const std::filesystem::path& file);
+
+}  // namespace femxdem

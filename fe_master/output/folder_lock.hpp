@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace femxdem {
+
+/// A folder of results belongs to one run at a time: the file running.lock in it names host, boot, process and its
+/// start.
+///
+/// The lock of a process of this host that has ended (killed, or of before a reboot) is taken over; `remark` then says
+/// so. Throws UserError while the other run lives, or where it is of another host and cannot be asked. The file goes
+/// with this object, and on SIGTERM, SIGINT and SIGHUP.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+  const std::string& remark() const { return remark_; }
+
+ private:
+  std::filesystem::path file_;
+  std::string remark_;
+};
+
+}  // namespace femxdem
