@@ -64,7 +64,8 @@ def _functors(loop):
         if wrong:
             return f"{type(functor).__name__}.{wrong}"
     makers = [getattr(physics, name, None) for name in ("kn", "ks")]
-    if any(m is not None and (m.algo != "val" or m.matches) for m in makers) or (makers[0] is None) != (makers[1] is None):
+    matching = any(m is not None and (m.algo != "val" or m.matches) for m in makers)
+    if matching or (makers[0] is None) != (makers[1] is None):
         return f"{type(physics).__name__} matches materials for its stiffnesses"
     return "its contact loop has callbacks" if loop.callbacks else None
 
@@ -179,17 +180,18 @@ def _contact_arrays(O, law, contacts):
     phys, geom = [i.phys for i in contacts], [i.geom for i in contacts]
     ids = np.array([(i.id1, i.id2) for i in contacts], dtype=np.int64).reshape(m, 2)
     shift = np.array([list(i.cellDist) for i in contacts], dtype=np.int64).reshape(m, 3)
-    cohesive = {name: np.zeros(m) for name in ("normalAdhesion", "shearAdhesion", "unp", "unpMax", "fragile", "cohesionBroken")}
+    names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
+    cohesive = {name: np.zeros(m) for name in (*names, "fragile", "cohesionBroken")}
     if law == COHESIVE:
         cohesive = {name: _scalars(phys, name) for name in cohesive}
     kn, normal = _scalars(phys, "kn"), _vectors(geom, "normal")
     overlap = _scalars(geom, "penetrationDepth")
-    on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, kn * (overlap - cohesive["unp"]), -cohesive["normalAdhesion"])
+    elastic = kn * (overlap - cohesive["unp"])
+    on_normal = _normal_forces(_vectors(phys, "normalForce"), normal, elastic, -cohesive["normalAdhesion"])
     waits = np.zeros(m, dtype=np.int64)
     if contact_laws.adhesion_of_new_contacts(O):
         _, last_look = contact_laws.looks_for_new_contacts(O)
         waits[:] = (_scalars(contacts, "iterMadeReal") >= last_look) & (cohesive["normalAdhesion"] <= 0)
-    names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     return [
         *(ids, shift, waits, kn, _scalars(phys, "ks")),
         *(cohesive[name] for name in names),
@@ -220,8 +222,8 @@ class Scene:
 
     SPHERES = {"x": 3, "v": 3, "w": 3, "f": 3, "t": 3, "turned": 4}
     SPHERES |= dict.fromkeys("radius mass inertia young poisson tangent".split(), 1)
-    CONTACTS = dict.fromkeys("kn ks normal_adhesion shear_adhesion unp unp_max tangent fragile broken normal_force".split(), 1)
-    CONTACTS |= {"shear": 3, "normal": 3}
+    CONTACTS = "kn ks normal_adhesion shear_adhesion unp unp_max tangent fragile broken normal_force"
+    CONTACTS = {**dict.fromkeys(CONTACTS.split(), 1), "shear": 3, "normal": 3}
 
     def __init__(self, exported):
         if exported[: len(MAGIC)] != MAGIC:

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The compact cell against YADE to the bit, over packings: kappa, k_n/k_t and size ratio three values each, the laws in turn.
+"""The compact cell against YADE to the bit, over packings: three values each of kappa, k_n/k_t and size ratio, laws in turn.
 
     bits.py [--spheres N] [--steps 1,10,100,1000] [--inertial-number I] [--modules BUILD]
 
@@ -72,7 +72,7 @@ def main():
     parser.add_argument("--spheres", type=int, default=100)
     parser.add_argument("--steps", default="1,10,100,1000")
     parser.add_argument("--inertial-number", type=float, default=2e-2)
-    parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled Python modules")
+    parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
     arguments = parser.parse_args()
     sys.path[:0] = [str(ROOT / "yade_scripts"), str(arguments.modules)]
     from volume_element import Engine
@@ -85,7 +85,8 @@ def main():
         first, last, changed, wrong = compare(engine, state, steps, arguments.inertial_number, spec["seed"])
         law = spec.get("contact_law", "adhesive") + (", new too" if "new_contacts" in spec else "")
         shape = f"{spec['kappa']:5.0f}  {spec['stiffness_ratio']:5.1f}  {spec['size_ratio']:11.1f}"
-        print(f"{shape}  {law:21}  {first:4d} -> {last:4d}  {changed:8d}  {'yes' if not wrong else 'NO: ' + ', '.join(wrong)}", flush=True)
+        verdict = "NO: " + ", ".join(wrong) if wrong else "yes"
+        print(f"{shape}  {law:21}  {first:4d} -> {last:4d}  {changed:8d}  {verdict}", flush=True)
         failed += bool(wrong)
     print(f"{27 - failed} of 27 packings equal YADE to the bit after {arguments.steps} steps each")
     sys.exit(1 if failed else 0)

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""What a step and a trial cost: YADE as it is and the compact cell's kernels, interleaved in one process, processor time.
+"""What a step and a trial cost: YADE as it is and the compact cell's kernels, interleaved, processor time.
 
     cost.py [--spheres 1000] [--law adhesive] [--inertial-number 2e-2] [--modules BUILD] [--state FILE]
 
-A step: microseconds, least and median of blocks of ten. A trial of the compact cell: copy of the committed block, n steps,
-stress; least and median [ms]. YADE's own n steps stand beside it, without the fork that a trial in YADE needs as well.
+A step: microseconds, least and median of blocks of ten. A trial of the compact cell: copy of the committed block, n
+steps, stress; least and median [ms]. YADE's own n steps stand beside it, without the fork that a trial in YADE needs as well.
 """
 
 import argparse
@@ -15,7 +15,11 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-LAWS = {"adhesive": {"cohesion": 1.0}, "bonded": {"cohesion": 1.0, "contact_law": "bonded"}, "friction": {"contact_law": "friction"}}
+LAWS = {
+    "adhesive": {"cohesion": 1.0},
+    "bonded": {"cohesion": 1.0, "contact_law": "bonded"},
+    "friction": {"contact_law": "friction"},
+}
 STEPS = (3, 10, 30)
 BLOCK, BLOCKS, WARM, TRIALS = 10, 40, 100, 40
 BIAXIAL = np.array([[0.6, 0.1, 0.0], [0.1, -1.0, 0.05], [0.0, 0.05, 0.0]])
@@ -70,7 +74,7 @@ def main():
     parser.add_argument("--spheres", type=int, default=1000)
     parser.add_argument("--law", choices=LAWS, default="adhesive")
     parser.add_argument("--inertial-number", type=float, default=2e-2)
-    parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled Python modules")
+    parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
     parser.add_argument("--state", type=Path, help="a prepared state of `femxdem ve prepare` instead of a new packing")
     arguments = parser.parse_args()
     sys.path[:0] = [str(ROOT / "yade_scripts"), str(arguments.modules)]
@@ -88,12 +92,13 @@ def main():
     committed = compact_cell.CompactCell.from_scene(start)
     times = costs(engine, ve, start, L)
     print(f"{len(committed)} spheres, {committed.contacts} contacts, {arguments.law}, I = {arguments.inertial_number:g}")
-    print("            a step [us]: min, median    n steps [ms]: " + ", ".join(f"n = {n}" for n in STEPS) + ", min / median")
+    print("            a step [us]: min, median; n steps [ms], min / median, n = " + ", ".join(map(str, STEPS)))
     print(line("YADE", times["YADE"], {n: np.array(times["YADE"]) * n / BLOCK for n in STEPS}))
     for kernel in compact_cell.kernels():
         print(line(kernel.name, times[kernel], trials(start, L, kernel)))
     best = times[compact_cell.kernels()[-1]]
-    print(f"YADE over compact: {min(times['YADE']) / min(best):.1f} (min), {np.median(times['YADE']) / np.median(best):.1f} (median)")
+    ratios = [f(times["YADE"]) / f(best) for f in (min, np.median)]
+    print("YADE over compact: {:.1f} (min), {:.1f} (median)".format(*ratios))
     trial = committed.copy()
     for name, action in (
         ("copy", lambda: trial.assign(committed)),
