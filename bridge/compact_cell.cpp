@@ -120,8 +120,8 @@ PointReport CompactCell::report() const { return femxdem::report(block_->arrays(
 VeInfo CompactCell::info() const {
   const CompactHeader& h = block_->header();
   const double pressure = femxdem::pressure(love_weber(block_->arrays()));
-  return {h.time_step,    time_scale(h, pressure), determinant(h.H),
-          static_cast<double>(h.spheres), h.mean_diameter,         pressure};
+  return {h.time_step, time_scale(h, pressure), determinant(h.H), static_cast<double>(h.spheres), h.mean_diameter,
+          pressure};
 }
 
 std::array<double, 81> CompactCell::stiffness(bool relaxed) const {

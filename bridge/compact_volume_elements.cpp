@@ -38,7 +38,9 @@ struct ByBits {
 
 CompactVolumeElements::CompactVolumeElements(WorkerProcess& worker, VolumeElementOptions options,
                                              CompactOptions compact)
-    : worker_(worker), options_(std::move(options)), compact_(std::move(compact)), referee_(worker) {}
+    : worker_(worker), options_(std::move(options)), compact_(std::move(compact)), referee_(worker) {
+  options_.quantised = true;
+}
 
 CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& state) {
   const std::optional<VeState> saved = decode(state);
@@ -89,26 +91,27 @@ void CompactVolumeElements::begin_step() {
 
 std::vector<Response> CompactVolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
   require_answerable(wanted, F.size(), size());
-  std::vector<Tensor2> followed(F.size());
   std::vector<Straining> plans(F.size());
   in_parallel(size(), [&](std::size_t p) {
-    followed[p] = quantised(F[p]);
-    plans[p] = plan_straining(options_, points_[p].strained, points_[p].time_step, p, followed[p]);
+    plans[p] = plan_straining(options_, points_[p].strained, points_[p].time_step, p, F[p]);
   });
-  group(followed, plans);
+  group(plans);
   const std::vector<std::size_t> order = longest_first();
   in_parallel(order.size(), [&](std::size_t t) { strain(trials_[order[t]], wanted); });
   count_memory();
   for (Trial& trial : trials_) {
     if (trial.checked) check(trial);
   }
-  std::vector<Response> responses;
+  std::vector<Response> responses(size());
   for (std::size_t p = 0; p < size(); ++p) {
-    responses.push_back(trials_[trial_of_point_[p]].response);
-    if (responses.back().failure) responses.back().failure->point = p;
+    const Trial& trial = trials_[trial_of_point_[p]];
+    responses[p].report = trial.report;
+    responses[p].failure = plans[p].refusal;
+    if (trial.failure) responses[p].failure = Failure{p, *trial.failure, kSmallerStep};
+    if (!responses[p].failure) judge(options_, plans[p], p, trial.found, responses[p]);
   }
   trial_pending_ = true;
-  trial_failed_ = std::any_of(trials_.begin(), trials_.end(), [](const Trial& t) { return t.response.failure; });
+  trial_failed_ = std::any_of(responses.begin(), responses.end(), [](const Response& r) { return r.failure; });
   return responses;
 }
 
@@ -122,22 +125,25 @@ std::vector<std::size_t> CompactVolumeElements::longest_first() const {
 }
 
 /// Points that start from the same cell and ask for the same of it make one trial.
-void CompactVolumeElements::group(std::span<const Tensor2> F, const std::vector<Straining>& plans) {
+void CompactVolumeElements::group(const std::vector<Straining>& plans) {
   for (Trial& trial : trials_) spare_.push_back(std::move(trial.cell));
   std::erase_if(spare_, [](const Cell& cell) { return cell == nullptr || cell.use_count() > 1; });
   trials_.clear();
   trial_of_point_.assign(size(), 0);
   std::map<std::pair<const CompactCell*, long>, std::map<Tensor2, std::size_t, ByBits>> known;
   for (std::size_t p = 0; p < size(); ++p) {
+    if (plans[p].refusal) {
+      trial_of_point_[p] = trials_.size();
+      trials_.emplace_back().first = p;
+      continue;
+    }
     auto& of_cell = known[{points_[p].cell.get(), plans[p].steps}];
-    const auto [entry, added] = of_cell.try_emplace(F[p], trials_.size());
+    const auto [entry, added] = of_cell.try_emplace(plans[p].U, trials_.size());
     trial_of_point_[p] = entry->second;
     if (!added) continue;
     Trial& trial = trials_.emplace_back();
     trial.first = p;
     trial.straining = plans[p];
-    trial.response.failure = plans[p].refusal;
-    if (trial.response.failure) continue;
     trial.cell = spare_cell();
     trial.checked = referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
   }
@@ -164,23 +170,21 @@ void CompactVolumeElements::in_parallel(std::size_t count, Work work) const {
 }
 
 void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
-  if (trial.response.failure) return;
+  if (trial.cell == nullptr) return;
   const Point& point = points_[trial.first];
   CompactCell& cell = *trial.cell;
   cell = *point.cell;
   const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps);
-  if (end.failure) {
-    trial.response.failure = Failure{trial.first, *end.failure, kSmallerStep};
-    return;
-  }
-  trial.response.report = cell.trial_report();
-  Strained found{tensor(cell.stress()), tensor(cell.stretch()), {}};
-  if (wanted == Operator::elastic) found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
-  judge(options_, trial.straining, trial.first, found, trial.response);
+  trial.failure = end.failure;
+  if (trial.failure) return;
+  trial.report = cell.trial_report();
+  trial.found = {tensor(cell.stress()), tensor(cell.stretch()), {}};
+  if (wanted == Operator::elastic)
+    trial.found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
 }
 
 void CompactVolumeElements::check(const Trial& trial) {
-  if (trial.response.failure) return;
+  if (trial.failure) return;
   const Point& point = points_[trial.first];
   ++check_.trials;
   const auto difference = referee_.difference(point.strained.origin, *point.cell, trial.straining, *trial.cell);

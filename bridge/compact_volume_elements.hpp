@@ -25,8 +25,8 @@ struct EngineDiffers : std::runtime_error {
 };
 
 /// The volume elements of ONE rank as compact cells, strained by its threads. Points with equal histories (same start,
-/// F equal up to kQuantum since then) share one cell; the first trial in which they part gives each its own. Results
-/// depend neither on the number of threads nor on which points a rank holds.
+/// stretches equal up to kQuantum since then) share one cell; the first trial in which they part gives each its own.
+/// Results depend neither on the number of threads nor on which points a rank holds.
 class CompactVolumeElements : public LocalPoints {
  public:
   CompactVolumeElements(WorkerProcess& worker, VolumeElementOptions options, CompactOptions compact);
@@ -60,7 +60,9 @@ class CompactVolumeElements : public LocalPoints {
     Cell cell;
     std::size_t first = 0;  ///< of its points
     Straining straining;
-    Response response;
+    std::optional<std::string> failure;
+    Strained found;
+    PointReport report;
     bool checked = false;
   };
 
@@ -68,7 +70,7 @@ class CompactVolumeElements : public LocalPoints {
   void adopt(Point& point) const;
   Cell spare_cell();
   std::vector<std::size_t> longest_first() const;
-  void group(std::span<const Tensor2> F, const std::vector<Straining>& plans);
+  void group(const std::vector<Straining>& plans);
   void strain(Trial& trial, Operator wanted) const;
   void check(const Trial& trial);
   template <class Work>

@@ -48,7 +48,7 @@ Straining plan_straining(const VolumeElementOptions& options, StrainedPoint& poi
   }
   const PolarDecomposition polar = polar_decomposition(F);
   plan.R = polar.R;
-  plan.U = polar.U;
+  plan.U = options.quantised ? quantised(polar.U) : polar.U;
   // ln of U U_n^-1, which is similar to a symmetric positive definite tensor: its eigenvalues are real and positive
   const Tensor2 increment = (plan.U * point.stretch.inverse()).log();
   const double size = increment.norm();

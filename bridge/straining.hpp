@@ -21,6 +21,7 @@ struct VolumeElementOptions {
   double max_unbalanced_force = 0.2;  ///< an answer above is refused [-]
   double max_increment = 0.2;         ///< largest |ln U_inc| of one trial [-]
   bool relaxed = false;               ///< the elastic stiffness is the relaxed one, not Eq. (2)
+  bool quantised = false;             ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
   bool serialise = false;             ///< YADE's volume elements are saved and restored at every trial, not forked
   /// Where remarks go: a trial that was repeated, a fork that was refused.
   std::function<void(std::string_view)> say = [](std::string_view) {};

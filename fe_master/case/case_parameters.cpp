@@ -187,8 +187,9 @@ Section<VeParameters> ve_section() {
        parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
        word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
        parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
-       parameter("cache", &V::cache, "", kAny, "folder of prepared packings; empty: packings in the working folder, or in that of the results where "
-                     "the former cannot be written")}};
+       parameter("cache", &V::cache, "", kAny,
+                 "folder of prepared packings; empty: packings in the working folder, or in that of the results where "
+                 "the former cannot be written")}};
 }
 
 Section<Load> load_section() {

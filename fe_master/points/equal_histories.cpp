@@ -8,8 +8,8 @@
 
 namespace femxdem {
 
-Tensor2 quantised(const Tensor2& F) {
-  return F.unaryExpr([](double value) { return std::nearbyint(value / kQuantum) * kQuantum; });
+Tensor2 quantised(const Tensor2& U) {
+  return U.unaryExpr([](double value) { return std::nearbyint(value / kQuantum) * kQuantum; });
 }
 
 EqualHistories::EqualHistories(std::span<const std::string> states) {
@@ -23,8 +23,8 @@ std::size_t EqualHistories::trial(std::span<const Tensor2> F) {
   trial_.clear();
   for (std::size_t p = 0; p < F.size(); ++p) {
     std::array<double, 9> key{};
-    if (F[p].allFinite()) {
-      const Tensor2 followed = quantised(F[p]);
+    if (F[p].allFinite() && F[p].determinant() > 0) {
+      const Tensor2 followed = quantised(polar_decomposition(F[p]).U);
       std::copy_n(followed.data(), 9, key.begin());
     }
     trial_.push_back(known.try_emplace({committed_[p], key}, static_cast<int>(known.size())).first->second);

@@ -9,11 +9,12 @@
 
 namespace femxdem {
 
-/// Volume elements follow F up to this: points whose histories differ by round-off alone then do the same to the bit.
-inline constexpr double kQuantum = 1.0 / (1LL << 40);
-Tensor2 quantised(const Tensor2& F);
+/// Volume elements follow the stretch up to this: points whose histories differ by round-off alone then do the same to
+/// the bit.
+inline constexpr double kQuantum = 1.0 / (1LL << 46);
+Tensor2 quantised(const Tensor2& U);
 
-/// Which points have had the same history so far: the same start, and F equal up to kQuantum ever since.
+/// Which points have had the same history so far: the same start, and stretches equal up to kQuantum ever since.
 class EqualHistories {
  public:
   /// Points with equal states have an equal start.

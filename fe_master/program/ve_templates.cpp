@@ -162,6 +162,7 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
   options.relaxed = ve.stiffness == VeStiffness::relaxed;
+  options.quantised = ve.sorted_contacts;
   options.serialise = ve.snapshot == Snapshot::serialise;
   return options;
 }

@@ -180,9 +180,8 @@ void TimeLoop::write_fields() {
 }
 
 void TimeLoop::write_state() {
-  Checkpoint checkpoint{files_.summary.steps,     solver_.committed().time, size_.size(), {}, {},
-                        files_.summary.case_hash, options_.versions,
-                        comparable_toml(case_)};
+  Checkpoint checkpoint{files_.summary.steps,     solver_.committed().time, size_.size(),          {}, {},
+                        files_.summary.case_hash, options_.versions,        comparable_toml(case_)};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back(
