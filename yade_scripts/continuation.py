@@ -69,7 +69,8 @@ def _serve(question, reply, answer):
 
 
 def own(O, to_forces):
-    """The Copy of a scene before adoption; its question: (time step [s], velocity gradient (3, 3) [1/s], steps); its answer:
+    """The Copy of a scene before adoption; its question: (time step, velocity gradient (3, 3), steps), in the
+    scene's unit of time; its answer:
     {"as it was left": State, "at rest": State}, with and without the velocities of its grains."""
     return Copy(lambda question: _both(O, to_forces, *question))
 

@@ -119,6 +119,7 @@ class Engine:
             archive_check.refuse_dropped(made, archive_check.state(self.O), self.O, "as it was made")
             info = self.info(ve)
             L = continuation.strain_rate(info["time_scale"], info["time_step"])
+            scene_step, scene_L = self.O.dt, self._grains[ve].unit.scene_rate(L)
             self.deform(ve, L, steps)
             adopted = archive_check.state(self.O)
             archive_check.refuse_not_finite(self.O, f"after {steps} steps of a small strain")
@@ -131,7 +132,7 @@ class Engine:
         finally:
             self.remove(ve)
             self._select(0)
-        theirs = itself.ask((info["time_step"], L, steps))
+        theirs = itself.ask((scene_step, scene_L, steps))
         strain = float(np.linalg.norm(L)) * info["time_step"] * steps
         return continuation.report(theirs, adopted, steps, strain, settled)
 
