@@ -71,6 +71,7 @@ void Worker::answer(const Message& message) {
                               message.command == Command::save || message.command == Command::load ||
                               message.command == Command::write_back || message.command == Command::referee;
   if (changes_states) snapshot_.clear();
+  if (changes_states && message.command != Command::save && message.command != Command::load) restored_.clear();
   switch (message.command) {
     case Command::versions:
       return reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, engine_.versions()));
@@ -144,16 +145,21 @@ void Worker::referee(const Message& message) {
 void Worker::save(const Message& message) {
   const auto index = static_cast<std::size_t>(message.a);
   const std::string state = engine_.save(ves_.at(index));
-  engine_.replace(ves_[index], state);
-  refresh(index);
+  restore(index, state);
   reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, state));
 }
 
 void Worker::load(const Message& message) {
   const auto index = static_cast<std::size_t>(message.a);
-  engine_.replace(ves_.at(index), get_mail(kMailDescriptor, message.mail));
-  refresh(index);
+  restore(index, get_mail(kMailDescriptor, message.mail));
   reply(message, ReplyKind::done);
+}
+
+void Worker::restore(std::size_t index, const std::string& state) {
+  engine_.replace(ves_.at(index), state);
+  restored_.resize(ves_.size());
+  restored_[index] = state;
+  refresh(index);
 }
 
 void Worker::refresh(std::size_t index) {
@@ -225,6 +231,7 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
   complete_reports();
+  restored_.clear();
   follow_networks();
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
@@ -240,6 +247,7 @@ void Worker::commit_in_process(const Message& message) {
   trial_in_process_ = false;
   snapshot_.clear();
   complete_reports();
+  restored_.clear();
   follow_networks();
   reply(message, ReplyKind::done, getpid());
 }
@@ -250,11 +258,17 @@ void Worker::reject_in_process() {
   for (std::size_t i = 0; i < ves_.size(); ++i) engine_.replace(ves_[i], snapshot_[i]);
 }
 
+/// A second restoration of the same state could sum forces in another order: what has just been restored stays.
 void Worker::take_snapshot() {
-  for (const int ve : ves_) {
-    snapshot_.push_back(engine_.save(ve));
-    engine_.replace(ve, snapshot_.back());
+  restored_.resize(ves_.size());
+  for (std::size_t i = 0; i < ves_.size(); ++i) {
+    if (restored_[i].empty()) {
+      restored_[i] = engine_.save(ves_[i]);
+      engine_.replace(ves_[i], restored_[i]);
+    }
   }
+  snapshot_ = std::move(restored_);
+  restored_.clear();
 }
 
 void Worker::complete_reports() noexcept {

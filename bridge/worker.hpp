@@ -46,6 +46,7 @@ class Worker {
   void deform_all(std::int64_t stiffness);
   void deform_one(std::size_t index, std::int64_t stiffness);
   void take_snapshot();
+  void restore(std::size_t index, const std::string& state);
   /// An engine that fails in one of these two ends the process: the rank repeats the trial once, from the committed
   /// state.
   void complete_reports() noexcept;
@@ -56,6 +57,7 @@ class Worker {
   Batch& batch_;
   pid_t rank_;
   std::vector<int> ves_;               ///< the engine's numbers
+  std::vector<std::string> restored_;  ///< what every volume element has just been restored from; empty: unknown
   std::vector<std::string> snapshot_;  ///< committed states while trials run in this process
   bool trial_in_process_ = false;
 };

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "../material_points_contract.hpp"
+#include "compact_volume_elements.hpp"
+#include "errors.hpp"
 #include "python_volume_elements.hpp"
 
 namespace femxdem {
@@ -80,6 +82,89 @@ TEST(YadeVolumeElements, CompanyDoesNotMatter) {
     EXPECT_TRUE(contract::same_bits(a[0].stress, b[0].stress));
     three.points.commit();
     one.points.commit();
+  }
+}
+
+struct CompactCells {
+  explicit CompactCells(std::size_t count, CompactOptions compact = {}, VolumeElementOptions options = {})
+      : worker({}), points(worker, std::move(options), std::move(compact)) {
+    points.add(packing(), count);
+  }
+  WorkerProcess worker;
+  CompactVolumeElements points;
+};
+
+TEST(CompactVolumeElements, Contract) {
+  VolumeElementOptions options;
+  options.min_steps = 1;
+  CompactCells cells(3, {.threads = 2, .check_share = 0, .evidence = {}}, options);
+  contract::check_local(cells.points, tolerances());
+}
+
+TEST(CompactVolumeElements, EveryTrialOfAPathEqualsYadesToTheBit) {
+  CompactCells cells(3, {.threads = 1, .check_share = 1, .evidence = {}});
+  const auto F = gradients(3, 1e-3);
+  for (const double fraction : {0.3, 0.6, 1.0, 0.5}) {
+    contract::trial(cells.points, part(F, fraction));
+    cells.points.commit();
+  }
+  EXPECT_EQ(cells.points.engine_check().trials, 12);
+  EXPECT_EQ(cells.points.engine_check().equal, 12);
+}
+
+TEST(CompactVolumeElements, ThreadsAndSharingChangeNoBit) {
+  CompactCells one(4, {.threads = 1, .check_share = 0, .evidence = {}});
+  CompactCells two(4, {.threads = 2, .check_share = 0, .evidence = {}});
+  auto F = gradients(4, 1e-3);
+  F[1] = F[0];  // an equal history, until they part
+  for (const double fraction : {0.4, 0.8}) {
+    const auto a = contract::trial(one.points, part(F, fraction));
+    expect_same_bits(a, contract::trial(two.points, part(F, fraction)));
+    EXPECT_TRUE(contract::same_bits(a[0].stress, a[1].stress));
+    one.points.commit();
+    two.points.commit();
+  }
+  F[1] = part(F, 0.9)[1];
+  CompactCells alone(1, {.threads = 1, .check_share = 0, .evidence = {}});
+  alone.points.load({one.points.save()[1]});
+  const auto parted = contract::trial(one.points, F);
+  EXPECT_TRUE(contract::same_bits(parted[1].stress, contract::trial(alone.points, {F[1]})[0].stress));
+  EXPECT_FALSE(contract::same_bits(parted[0].stress, parted[1].stress));
+}
+
+/// A state of compact cells goes on in YADE, and back.
+TEST(CompactVolumeElements, StatesGoFromEngineToEngine) {
+  CompactCells compact(1);
+  WorkerCommand sorted;
+  sorted.sorted_contacts = true;
+  WorkerProcess worker(sorted);
+  VolumeElementOptions options;
+  options.quantised = true;
+  PythonVolumeElements yade(worker, options);
+  yade.add(packing(), 1);
+  const auto F = gradients(1, 1e-3);
+  contract::trial(compact.points, part(F, 0.5));
+  compact.points.commit();
+  yade.load(compact.points.save());
+  const auto ours = contract::trial(compact.points, F), yades = contract::trial(yade, F);
+  EXPECT_LE((ours[0].stress - yades[0].stress).norm(), 1e-14 * ours[0].stress.norm()) << "YADE sums in its own order";
+  EXPECT_EQ(ours[0].report["contacts"], yades[0].report["contacts"]);
+  EXPECT_EQ(ours[0].report["dem_steps"], yades[0].report["dem_steps"]);
+  yade.commit();
+  CompactCells back(1);
+  back.points.load(yade.save());
+  const auto further = contract::trial(back.points, part(F, 1.2));
+  EXPECT_FALSE(further[0].failure);
+}
+
+TEST(CompactVolumeElements, DamagedStatesAreRefused) {
+  CompactCells cells(1);
+  const std::string state = cells.points.save()[0];
+  for (const std::size_t at : {std::size_t{40}, state.size() / 2, state.size() - 1}) {
+    std::string damaged = state;
+    damaged[at] = static_cast<char>(damaged[at] ^ 4);
+    EXPECT_THROW(cells.points.load({damaged}), UserError) << at;
+    EXPECT_THROW(cells.points.load({state.substr(0, at)}), UserError) << at;
   }
 }
 
