@@ -145,7 +145,7 @@ void CompactVolumeElements::group(const std::vector<Straining>& plans) {
     trial.first = p;
     trial.straining = plans[p];
     trial.cell = spare_cell();
-    trial.checked = referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
+    trial.checked = plans[p].steps > 0 && referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
   }
 }
 

@@ -11,7 +11,7 @@ import compact_scene
 import contact_laws
 from compact_cell import CompactCell
 
-from cells import FIELDS, element, engine, measure, mandel, select, stiffness
+from cells import FIELDS, element, engine, mandel, measure, packing, select, stiffness
 
 SPHERES = 100
 SPECS = {
@@ -28,7 +28,7 @@ COUNTED_APART = {"iteration"}
 
 
 def sorted_element(spec):
-    ve = element({"spheres": SPHERES, **spec})
+    ve = element(packing(**{"spheres": SPHERES, **spec}))
     select(ve).engines[2].loopOnSortedInteractions = True
     return ve
 
@@ -80,7 +80,7 @@ class Bits(unittest.TestCase):
             for kernel in compact_cell.kernels():
                 cells[kernel] = cell(name)
             sets = set()
-            for L, steps in zip(rates(cell(name)), (1, 10, 100, 33, 7, 60, 60)):
+            for L, steps in zip(rates(cell(name)), (1, 10, 100, 133, 7, 160, 160)):
                 engine().deform(ve, L, steps)
                 state = compact_scene.export(O)
                 sets.add(compact_scene.Scene(state).ids.tobytes())
@@ -162,7 +162,7 @@ class States(unittest.TestCase):
                 self.assertEqual(differences(c.to_scene(), compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
 
     def test_a_state_does_not_fit_a_scene_of_other_spheres(self):
-        ve = element({"spheres": 60, "contact_law": "friction"})
+        ve = element(packing(contact_law="friction"))
         with self.assertRaisesRegex(RuntimeError, "100 spheres does not fit"):
             compact_scene.write_back(select(ve), exported("friction"))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import continuation
-from cells import engine, measure, rate
+from cells import engine, measure, rate, users
 
 SCRIPT = (Path(__file__).parents[1] / "cases/scripts/triaxial.py").read_text()
 DEFAULTS = {
@@ -60,7 +60,7 @@ class Scripts(unittest.TestCase):
 
     def make(self, **changes):
         Path("theirs.py").write_text(SCRIPT.format(**{**DEFAULTS, **changes}))
-        return engine().make_template({"source": "script", "script": os.path.abspath("theirs.py"), "script_steps": 160_000})
+        return engine().make_template(users("script", os.path.abspath("theirs.py"), script_steps=160_000))
 
     def refused(self, reason, **changes):
         with self.assertRaisesRegex(ValueError, reason):

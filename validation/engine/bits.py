@@ -74,14 +74,15 @@ def main():
     parser.add_argument("--inertial-number", type=float, default=2e-2)
     parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
     arguments = parser.parse_args()
-    sys.path[:0] = [str(ROOT / "yade_scripts"), str(arguments.modules)]
+    sys.path[:0] = [str(ROOT / "yade_scripts"), str(ROOT / "tests" / "yade"), str(arguments.modules)]
+    from cells import packing
     from volume_element import Engine
 
     engine, steps = Engine([]), [int(s) for s in arguments.steps.split(",")]
     print("kappa  kn/kt  d_max/d_min  law                    contacts       changed  equal")
     failed = 0
     for spec in packings(arguments.spheres):
-        state = engine.make_template(spec)["state"]
+        state = engine.make_template(packing(**spec))["state"]
         first, last, changed, wrong = compare(engine, state, steps, arguments.inertial_number, spec["seed"])
         law = spec.get("contact_law", "adhesive") + (", new too" if "new_contacts" in spec else "")
         shape = f"{spec['kappa']:5.0f}  {spec['stiffness_ratio']:5.1f}  {spec['size_ratio']:11.1f}"

@@ -77,13 +77,14 @@ def main():
     parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
     parser.add_argument("--state", type=Path, help="a prepared state of `femxdem ve prepare` instead of a new packing")
     arguments = parser.parse_args()
-    sys.path[:0] = [str(ROOT / "yade_scripts"), str(arguments.modules)]
+    sys.path[:0] = [str(ROOT / "yade_scripts"), str(ROOT / "tests" / "yade"), str(arguments.modules)]
     import compact_cell
     import compact_scene
+    from cells import packing
     from volume_element import Engine
 
     engine = Engine([])
-    spec = {"spheres": arguments.spheres, **LAWS[arguments.law]}
+    spec = packing(spheres=arguments.spheres, **LAWS[arguments.law])
     ve = engine.add(arguments.state.read_bytes() if arguments.state else engine.make_template(spec)["state"])
     L = BIAXIAL * arguments.inertial_number / engine.info(ve)["time_scale"] / np.linalg.norm(BIAXIAL)
     exporting = time.thread_time()
