@@ -1,0 +1,145 @@
+#!/usr/bin/python3
+"""Shear bands that start at the wall of a hollow cylinder: how many, how far they reach, how thick they are.
+
+    fe_master/program/spirals.py DIR [--from STEP] [--to STEP] [--angle 90]
+
+Bands of a cylinder under pressure are logarithmic spirals: they cut every radius at the same angle, so that in the plane of
+ln r and polar angle, a conformal map of the body, they are straight lines. On circles the ridges of the second invariant of
+the logarithmic strain are linked from one circle to the next; a straight line through each chain gives the angle to the
+radius. Thickness: full width at half height along the normal of the spiral, averaged along it, all in the current
+configuration. A sector is continued by reflection at its two ends, which are planes of symmetry.
+"""
+
+import argparse
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from band import axes_of, interpolator, width_at_half_height
+from results import ResultsError, deformed_points, read_mesh, read_step, strain_invariant_between
+
+
+@dataclass
+class Spiral:
+    start: float  #: polar angle at the wall [degrees]
+    inclination: float  #: to the radius [degrees], positive where the polar angle grows outwards
+    reach: float  #: radius where it ends / radius of the wall
+    thickness: float  #: mean over the stations, in the unit of the positions; nan where no profile falls to half
+    thickness_scatter: float  #: standard deviation over the stations
+    stations: int  #: profiles that were measured
+    peak: float  #: largest value along the ridge
+
+
+def log_polar(positions, values, angle):
+    """The field over (ln r, polar angle) of a sector of `angle` degrees, continued by reflection at both ends."""
+    radius, theta = np.linalg.norm(positions, axis=1), np.arctan2(positions[:, 1], positions[:, 0])
+    end = np.radians(angle)
+    thetas = np.concatenate([theta, -theta, 2 * end - theta])
+    near = (thetas > -0.75 * end) & (thetas < 1.75 * end)
+    x = np.column_stack([np.tile(np.log(radius), 3), thetas])[near]
+    return interpolator(x, np.tile(values, 3)[near])
+
+
+def ridges_of(field, xi, angle, prominence):
+    """Polar angles [rad] of the ridges on the circle ln r = xi: peaks that stand out by `prominence` of their height."""
+    theta = np.radians(np.arange(-0.7 * angle, 1.7 * angle, 0.25))
+    values = field(np.column_stack([np.full_like(theta, xi), theta]))
+    values = np.where(np.isfinite(values), values, 0.0)
+    peaks, found = find_peaks(values, prominence=1e-12)
+    strong = found["prominences"] > prominence * values[peaks]
+    return theta[peaks[strong]], values[peaks[strong]]
+
+
+def link(field, circles, angle, prominence):
+    """Chains of ridges outwards from the first circles: lists of (ln r, theta, value)."""
+    h, chains = circles[1] - circles[0], []
+    for circle in circles:
+        thetas, values = ridges_of(field, circle, angle, prominence)
+        free = np.ones(len(thetas), dtype=bool)
+        for chain in sorted(chains, key=len, reverse=True):
+            if circle - chain[-1][0] > 2.5 * h:
+                continue
+            dx = circle - chain[-1][0]
+            tail = np.array(chain[-8:])
+            slope = np.polyfit(tail[:, 0], tail[:, 1], 1)[0] if len(tail) >= 4 else 0.0
+            window = 0.6 * dx + 0.02 if len(tail) >= 4 else 1.6 * dx + 0.02
+            miss = np.where(free, np.abs(thetas - chain[-1][1] - slope * dx), np.inf)
+            if len(miss) and miss.min() < window:
+                best = int(np.argmin(miss))
+                free[best] = False
+                chain.append((circle, thetas[best], values[best]))
+        chains += [[(circle, t, v)] for t, v in zip(thetas[free], values[free])]
+    return [np.array(chain) for chain in chains]
+
+
+def widths_along(field, chain, inclination, spacing):
+    """Full widths at half height along the normals of a spiral, one for each ridge point where both sides fall to half."""
+    _, across = axes_of(inclination)
+    t = np.arange(-0.6, 0.6, spacing / 4)
+    t = t - t[np.argmin(np.abs(t))]
+    widths = []
+    for xi, theta, _ in chain:
+        x = np.array([xi, theta]) + t[:, None] * across
+        scale = np.exp(x[:, 0])
+        arc = np.concatenate([[0.0], np.cumsum(0.5 * (scale[1:] + scale[:-1]) * np.diff(t))])
+        measured = width_at_half_height(arc - np.interp(0.0, t, arc), field(x))
+        if measured:
+            widths.append(measured[2])
+    return np.array(widths)
+
+
+def measure_spirals(positions, values, angle=90.0, wall=None, shortest=0.2, prominence=0.15):
+    """Spirals of a scalar field, values (n,) at positions (n, 2) of a sector from the x axis about the origin, those longer
+    than `shortest` in ln r that start at the wall, strongest first. A band and its reflection count once. `wall`: its
+    radius, by default the least one. Throws ResultsError where there is none."""
+    positions, values = np.reshape(positions, (-1, 2)), np.ravel(values)
+    radius = np.linalg.norm(positions, axis=1)
+    wall = wall or radius.min()
+    field = log_polar(positions, values, angle)
+    spacing = np.sqrt(np.radians(angle) * np.log(radius.max() / radius.min()) / len(positions))
+    circles = np.arange(np.log(radius.min()) + 0.6 * spacing, np.log(radius.max()) - spacing, spacing / 2)
+    spirals = []
+    for chain in link(field, circles, angle, prominence):
+        starts_at_wall = chain[0, 0] < np.log(wall) + 4 * spacing
+        inside = -1e-9 <= chain[0, 1] <= np.radians(angle) + 1e-9
+        if chain[-1, 0] - chain[0, 0] < shortest or not starts_at_wall or not inside:
+            continue
+        slope, theta = np.polyfit(chain[:, 0] - np.log(wall), chain[:, 1], 1)
+        inclination = np.degrees(np.arctan(slope))
+        widths = widths_along(field, chain, inclination, spacing)
+        thickness = (widths.mean(), widths.std()) if len(widths) else (np.nan, np.nan)
+        spirals.append(Spiral(float(np.degrees(theta)), float(inclination), float(np.exp(chain[-1, 0]) / wall), *map(float, thickness),
+                              len(widths), float(chain[:, 2].max())))
+    if not spirals:
+        raise ResultsError("no band starts at the wall and goes on outwards; measure a later step (--to), or the strain since one (--from)")
+    return sorted(spirals, key=lambda spiral: -spiral.peak)
+
+
+def spirals_of_run(folder, first=None, last=None, angle=90.0):
+    """Spirals of the strain up to an output step (default: the last), or since the output step `first`."""
+    mesh, step = read_mesh(folder), read_step(folder, last)
+    values = step.fields["strain_invariant"] if first is None else strain_invariant_between(read_step(folder, first), step)
+    wall = np.linalg.norm(mesh.nodes + step.displacement, axis=1).min()
+    return measure_spirals(deformed_points(mesh, step), values, angle, wall)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", metavar="DIR", help="folder that `femxdem run` wrote")
+    parser.add_argument("--from", dest="first", type=int, metavar="STEP", help="output step where the strain starts")
+    parser.add_argument("--to", dest="last", type=int, metavar="STEP", help="output step where it ends (default: the last)")
+    parser.add_argument("--angle", type=float, default=90.0, help="of the sector [degrees]")
+    arguments = parser.parse_args()
+    try:
+        spirals = spirals_of_run(arguments.folder, arguments.first, arguments.last, arguments.angle)
+    except ResultsError as error:
+        sys.exit(f"spirals.py: {error}")
+    for one in spirals:
+        print(f"from {one.start:.0f} degrees, {one.inclination:+.1f} degrees to the radius, reaches {one.reach:.2f} wall radii, "
+              f"thickness {one.thickness:.3g} m (scatter {one.thickness_scatter:.2g} over {one.stations} profiles), peak {one.peak:.3g}")
+
+
+if __name__ == "__main__":
+    main()
