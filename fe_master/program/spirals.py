@@ -6,8 +6,8 @@
 Bands of a cylinder under pressure are logarithmic spirals: they cut every radius at the same angle, so that in the plane of
 ln r and polar angle, a conformal map of the body, they are straight lines. On circles the ridges of the second invariant of
 the logarithmic strain are linked from one circle to the next; a straight line through each chain gives the angle to the
-radius. Thickness: full width at half height along the normal of the spiral, averaged along it, all in the current
-configuration. A sector is continued by reflection at its two ends, which are planes of symmetry.
+radius. Thickness: full width along the normal of the spiral at half of the height over the higher one of the two valleys
+beside it (a pressure strains the whole wall), averaged along it, all in the current configuration. A sector is continued by reflection at its two ends, which are planes of symmetry.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from band import axes_of, interpolator, width_at_half_height
+from band import axes_of, interpolator
 from results import ResultsError, deformed_points, read_mesh, read_step, strain_invariant_between
 
 
@@ -25,8 +25,8 @@ from results import ResultsError, deformed_points, read_mesh, read_step, strain_
 class Spiral:
     start: float  #: polar angle at the wall [degrees]
     inclination: float  #: to the radius [degrees], positive where the polar angle grows outwards
-    reach: float  #: radius where it ends / radius of the wall
-    thickness: float  #: mean over the stations, in the unit of the positions; nan where no profile falls to half
+    reach: float  #: radius where its ridge ends, or falls below a tenth of its peak / radius of the wall
+    thickness: float  #: mean over the stations, in the unit of the positions; nan where no profile has two sides
     thickness_scatter: float  #: standard deviation over the stations
     stations: int  #: profiles that were measured
     peak: float  #: largest value along the ridge
@@ -44,7 +44,7 @@ def log_polar(positions, values, angle):
 
 def ridges_of(field, xi, angle, prominence):
     """Polar angles [rad] of the ridges on the circle ln r = xi: peaks that stand out by `prominence` of their height."""
-    theta = np.radians(np.arange(-0.7 * angle, 1.7 * angle, 0.25))
+    theta = np.radians(np.arange(-0.7 * angle, 1.7 * angle, 0.5))
     values = field(np.column_stack([np.full_like(theta, xi), theta]))
     values = np.where(np.isfinite(values), values, 0.0)
     peaks, found = find_peaks(values, prominence=1e-12)
@@ -62,7 +62,7 @@ def link(field, circles, angle, prominence):
             if circle - chain[-1][0] > 2.5 * h:
                 continue
             dx = circle - chain[-1][0]
-            tail = np.array(chain[-8:])
+            tail = np.array(chain[-6:])
             slope = np.polyfit(tail[:, 0], tail[:, 1], 1)[0] if len(tail) >= 4 else 0.0
             window = 0.6 * dx + 0.02 if len(tail) >= 4 else 1.6 * dx + 0.02
             miss = np.where(free, np.abs(thetas - chain[-1][1] - slope * dx), np.inf)
@@ -74,8 +74,40 @@ def link(field, circles, angle, prominence):
     return [np.array(chain) for chain in chains]
 
 
+def width_over_valleys(s, profile):
+    """Full width of the peak nearest to s = 0 at half of its height over the higher one of the valleys beside it; None where
+    the body ends before there is a valley and the profile has not fallen to half."""
+    peak = int(np.argmin(np.abs(s)))
+    while True:
+        around = slice(max(peak - 1, 0), peak + 2)
+        if not np.isfinite(profile[around]).all():
+            return None
+        higher = around.start + int(np.argmax(profile[around]))
+        if profile[higher] <= profile[peak]:
+            break
+        peak = higher
+    sides, valleys = {}, []
+    for direction in (-1, 1):
+        side = profile[peak::direction]
+        side = side[: np.argmax(~np.isfinite(side))] if not np.isfinite(side).all() else side
+        rises = side > np.minimum.accumulate(side) + 0.01 * profile[peak]
+        if not rises.any() and side.min() > profile[peak] / 2:
+            return None
+        sides[direction] = side[: np.argmax(rises)] if rises.any() else side
+        valleys.append(sides[direction].min())
+    level = 0.5 * (profile[peak] + max(valleys))
+    ends = []
+    for direction, side in sides.items():
+        k = int(np.argmax(side <= level))
+        if k == 0:
+            return None
+        share = (side[k - 1] - level) / (side[k - 1] - side[k])
+        ends.append(np.interp(k - 1 + share, np.arange(len(side)), np.abs(s[peak::direction][: len(side)] - s[peak])))
+    return sum(ends)
+
+
 def widths_along(field, chain, inclination, spacing):
-    """Full widths at half height along the normals of a spiral, one for each ridge point where both sides fall to half."""
+    """Full widths along the normals of a spiral, one for each ridge point where the peak has two sides."""
     _, across = axes_of(inclination)
     t = np.arange(-0.6, 0.6, spacing / 4)
     t = t - t[np.argmin(np.abs(t))]
@@ -84,9 +116,9 @@ def widths_along(field, chain, inclination, spacing):
         x = np.array([xi, theta]) + t[:, None] * across
         scale = np.exp(x[:, 0])
         arc = np.concatenate([[0.0], np.cumsum(0.5 * (scale[1:] + scale[:-1]) * np.diff(t))])
-        measured = width_at_half_height(arc - np.interp(0.0, t, arc), field(x))
-        if measured:
-            widths.append(measured[2])
+        width = width_over_valleys(arc - np.interp(0.0, t, arc), field(x))
+        if width:
+            widths.append(width)
     return np.array(widths)
 
 
@@ -99,9 +131,13 @@ def measure_spirals(positions, values, angle=90.0, wall=None, shortest=0.2, prom
     wall = wall or radius.min()
     field = log_polar(positions, values, angle)
     spacing = np.sqrt(np.radians(angle) * np.log(radius.max() / radius.min()) / len(positions))
-    circles = np.arange(np.log(radius.min()) + 0.6 * spacing, np.log(radius.max()) - spacing, spacing / 2)
+    circles = np.arange(np.log(radius.min()) + 0.6 * spacing, np.log(radius.max()) - spacing, spacing)
     spirals = []
     for chain in link(field, circles, angle, prominence):
+        faint = chain[:, 2] < 0.1 * chain[:, 2].max()
+        chain = chain[:np.argmax(faint)] if faint.any() else chain
+        if not len(chain):
+            continue
         starts_at_wall = chain[0, 0] < np.log(wall) + 4 * spacing
         inside = -1e-9 <= chain[0, 1] <= np.radians(angle) + 1e-9
         if chain[-1, 0] - chain[0, 0] < shortest or not starts_at_wall or not inside:
