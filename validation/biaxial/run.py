@@ -31,6 +31,7 @@ PAPER = {
     "first_gradient_512": Row("first_gradient_512.toml", text="16 x 32 Q8"),
 }
 SENSITIVITY = {
+    "ve_friction": Row("ve_friction.toml", text="the volume element at twice its confinement: friction angle", path=True),
     "rate_5e-3": Row("128.toml", ("ve.inertial_number=5e-3",), "128 at a quarter of the rate"),
     "rate_2e-3": Row("128.toml", ("ve.inertial_number=2e-3",), "128 at a tenth of the rate"),
     **{f"packing_{n}": Row("128.toml", (f"ve.seed={n}",), f"128, packing {n}") for n in (2, 3, 4, 5)},
@@ -114,10 +115,34 @@ def claims(runs):
                 one, other = (np.interp(strain, c.strain, c.stress) for c in (curves[name], ve))
                 lines.append(f"| Fig. 3: the specimen follows its volume element before the peak | {name}: within "
                              f"{100 * np.abs(one - other).max() / ve.stress.max():.1f} % of the peak up to {100 * peak:.1f} % of strain |")
+    if {"ve", "ve_friction"} <= set(runs):
+        friction, cohesion, dilatancy = strength(runs["ve"], runs["ve_friction"])
+        lines.append(f"| bounds of the inclination, 45 + psi / 2 to 45 + phi / 2 | phi = {friction:.1f}, psi = {dilatancy:.1f} degrees, c = {cohesion:.2f} "
+                     f"sigma_0: {45 + dilatancy / 2:.1f} to {45 + friction / 2:.1f} degrees |")
     for a, b in (("128", "512"), ("first_gradient_128", "first_gradient_512")):
         if a in curves and b in curves:
             lines.append(pair_line(a, b, curves, runs))
     return lines
+
+
+def strength(one, other):
+    """Mohr-Coulomb line through the peaks of the volume element at two confinements: phi [degrees], c / sigma_0; and psi at the
+    first one's peak [degrees], sin psi = -(d eps_v / d gamma) over 1 % of strain around it, in plane strain."""
+    circles = []
+    for run in (one, other):
+        h = run.history()
+        peak = int(np.argmax(-h["stress_yy"]))
+        sigma = np.array([-h["stress_yy"][peak], -h["stress_xx"][peak]]) / 1e5
+        circles.append((sigma.sum() / 2, (sigma[0] - sigma[1]) / 2))
+    (s1, t1), (s2, t2) = circles
+    sin_phi = (t2 - t1) / (s2 - s1)
+    phi = np.arcsin(sin_phi)
+    cohesion = (t1 - s1 * sin_phi) / np.cos(phi)
+    h = one.history()
+    peak = int(np.argmax(-h["stress_yy"]))
+    a, b = max(peak - 5, 0), min(peak + 5, len(h["step"]) - 1)
+    dx, dy = h["strain_xx"][b] - h["strain_xx"][a], h["strain_yy"][b] - h["strain_yy"][a]
+    return float(np.degrees(phi)), float(cohesion), float(np.degrees(np.arcsin((dx + dy) / (dx - dy))))
 
 
 def pair_line(a, b, curves, runs):
@@ -197,9 +222,9 @@ def report(c):
         draw_maps(runs, first, c.product("maps_first_gradient.png"))
     if second := [name for name in ("128", "512") if name in runs]:
         draw_profiles(runs, second, c.product("profiles.png"))
-    if asked := [name for name in SENSITIVITY if name in runs]:
+    if asked := [name for name in SENSITIVITY if name in specimens]:
         draw_curves(runs, [name for name in ("128", *asked) if name in runs], c.product("sensitivity.png"))
-    lines = HEADER + [table_row(name, run) for name, run in runs.items()] + claims(runs)
+    lines = HEADER + [table_row(name, run) for name, run in runs.items() if name != "ve_friction"] + claims(runs)
     restart = bits_of_restart(c, "restart")
     if restart:
         lines += ["", restart_line(restart, "small.toml to 3 %, killed after step 12, gone on from step 10")]
