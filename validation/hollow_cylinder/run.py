@@ -8,6 +8,7 @@ Without names: the paper's rows and the restart. Finished rows are kept, one tha
 checkpoint. Every row ends with the figures and tables of all rows that have results.
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from spirals import spirals_of_run
 PAPER = {
     "952": Row("952.toml", text="28 x 34 Q8: Fig. 6a"),
     "870": Row("870.toml", text="29 x 30 second gradient: Fig. 6b"),
-    "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c"),
+    "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=15),
 }
 UNIQUENESS = {
     f"start_{n}": Row("870.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),
@@ -62,7 +63,6 @@ def curve_of(name, run):
 
 
 def memory(run):
-    import json
     file = run.folder / "summary.json"
     if not file.exists():
         return ""

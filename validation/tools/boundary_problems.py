@@ -25,11 +25,12 @@ class Row:
     settings: tuple = ()
     text: str = ""
     path: bool = False
+    checkpoint_every: int = 10  #: steps; while one is written the states of all points are in memory twice
 
     def run(self, c, name):
         if self.path:
             return c.path(self.case, name, *self.settings, c.cache)
-        return c.run(self.case, name, *self.settings, c.cache, checkpoint_every=10)
+        return c.run(self.case, name, *self.settings, c.cache, checkpoint_every=self.checkpoint_every)
 
 
 def existing(c, names):
