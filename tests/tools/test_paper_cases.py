@@ -45,12 +45,12 @@ class Paper(unittest.TestCase):
         for name in ("biaxial/128", "biaxial/512", "biaxial/ve", "hollow_cylinder/870", "hollow_cylinder/1280", "hollow_cylinder/952"):
             self.assertEqual(case(f"{name}.toml")["ve"]["spheres"], 1000)
 
-    def test_specimen_volume_element_and_cylinder_are_of_one_packing(self):
+    def test_specimen_and_volume_element_are_of_one_packing_and_the_cylinder_of_a_denser_one(self):
         cells = [case(f"{name}.toml")["ve"] for name in ("biaxial/128", "biaxial/ve", "hollow_cylinder/870")]
         for cell in cells:
             cell.pop("region", None)
         self.assertEqual(cells[0], cells[1])
-        self.assertEqual(cells[0], cells[2])
+        self.assertEqual(cells[0] | {"compaction_friction": 0.0}, cells[2])
 
 
 if __name__ == "__main__":

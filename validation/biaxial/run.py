@@ -14,7 +14,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tools"))
 import campaign
-from boundary_problems import Row, bits_of_restart, cost, existing, how_it_ended, killed_and_restarted, restart_line
+from boundary_problems import Row, bits_of_restart, cost, existing, how_it_ended, killed_and_restarted, restart_line, strength
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -123,26 +123,6 @@ def claims(runs):
         if a in curves and b in curves:
             lines.append(pair_line(a, b, curves, runs))
     return lines
-
-
-def strength(one, other):
-    """Mohr-Coulomb line through the peaks of the volume element at two confinements: phi [degrees], c / sigma_0; and psi at the
-    first one's peak [degrees], sin psi = -(d eps_v / d gamma) over 1 % of strain around it, in plane strain."""
-    circles = []
-    for run in (one, other):
-        h = run.history()
-        peak = int(np.argmax(-h["stress_yy"]))
-        sigma = np.array([-h["stress_yy"][peak], -h["stress_xx"][peak]]) / 1e5
-        circles.append((sigma.sum() / 2, (sigma[0] - sigma[1]) / 2))
-    (s1, t1), (s2, t2) = circles
-    sin_phi = (t2 - t1) / (s2 - s1)
-    phi = np.arcsin(sin_phi)
-    cohesion = (t1 - s1 * sin_phi) / np.cos(phi)
-    h = one.history()
-    peak = int(np.argmax(-h["stress_yy"]))
-    a, b = max(peak - 5, 0), min(peak + 5, len(h["step"]) - 1)
-    dx, dy = h["strain_xx"][b] - h["strain_xx"][a], h["strain_yy"][b] - h["strain_yy"][a]
-    return float(np.degrees(phi)), float(cohesion), float(np.degrees(np.arcsin((dx + dy) / (dx - dy))))
 
 
 def pair_line(a, b, curves, runs):

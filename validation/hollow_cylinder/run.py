@@ -15,7 +15,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tools"))
 import campaign
-from boundary_problems import Row, bits_of_restart, cost, existing, how_it_ended, killed_and_restarted, restart_line
+from boundary_problems import Row, bits_of_restart, cost, existing, how_it_ended, killed_and_restarted, restart_line, strength
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -33,12 +33,16 @@ UNIQUENESS = {
     f"start_{n}": Row("870.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),
                       f"870, random start {n} of the step past sigma_int = 2.8 sigma_0") for n in (1, 2, 3, 4, 5)
 }
+CELL = {
+    "ve": Row("../biaxial/ve.toml", ("ve.compaction_friction=0.0",), "the volume element alone: dilatancy", path=True),
+    "ve_friction": Row("../biaxial/ve_friction.toml", ("ve.compaction_friction=0.0",), "at twice its confinement: friction angle", path=True),
+}
 SMALL = {
     "small": Row("small.toml", text="12 x 12 second gradient, 100 spheres: tests and demonstrations"),
     "small_first_gradient": Row("small_first_gradient.toml", text="12 x 12 Q8, 100 spheres"),
 }
 RUNS = PAPER | UNIQUENESS | SMALL
-ROWS = {name: row.text for name, row in RUNS.items()} | {
+ROWS = {name: row.text for name, row in (RUNS | CELL).items()} | {
     "restart": "small.toml killed in the middle and gone on: the same bits",
     "report": "table and figures of the rows that have results",
 }
@@ -154,6 +158,11 @@ def report(c):
     lines = HEADER + [table_row(name, run) for name, run in runs.items()] + ["", *BANDS]
     for name, run in with_fields.items():
         lines += band_lines(name, run)
+    cell = existing(c, CELL)
+    if len(cell) == len(CELL):
+        phi, cohesion, psi = strength(*cell.values())
+        lines += ["", f"The volume element alone: phi = {phi:.1f}, psi = {psi:.1f} degrees, c = {cohesion:.2f} sigma_0; bands between 45 - phi / 2 and "
+                  f"45 - psi / 2 to the radius: {45 - phi / 2:.1f} to {45 - psi / 2:.1f} degrees."]
     restart = bits_of_restart(c, "restart")
     if restart:
         lines += ["", restart_line(restart, "small.toml, killed after step 12, gone on from step 10")]
@@ -167,14 +176,14 @@ def work(c, names):
         if name == "restart":
             killed_and_restarted(c, "small.toml", "restart", ["control.end_time=0.8"], kill_after=12, checkpoint_every=5)
         elif name != "report":
-            run = RUNS[name].run(c, name)
+            run = (RUNS | CELL)[name].run(c, name)
             print(f"{name}: {run.last_words()}", flush=True)
     return report(c)
 
 
 def main():
     arguments = campaign.parser(HERE, __doc__, rows=True).parse_args()
-    return campaign.main(HERE, arguments, ROWS, lambda c: work(c, arguments.rows or [*PAPER, "restart"]), on_meshes=True)
+    return campaign.main(HERE, arguments, ROWS, lambda c: work(c, arguments.rows or [*CELL, *PAPER, "restart"]), on_meshes=True)
 
 
 if __name__ == "__main__":

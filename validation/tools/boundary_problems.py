@@ -3,6 +3,7 @@ goes on."""
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -63,7 +64,11 @@ def cost(run):
 
 
 def how_it_ended(run):
-    return {0: "done", None: "unfinished"}.get(run.status, run.last_words())
+    """Done, or how far and why, without the paths of a machine."""
+    if run.status in (0, None):
+        return "done" if run.status == 0 else f"unfinished, step {run.steps()}"
+    stopped = re.search(r"(stopped after step \d+).*are in [^:]*: ([^;]*)", run.last_words())
+    return f"{stopped.group(1)}: {stopped.group(2)}" if stopped else f"exit status {run.status}"
 
 
 def killed_and_restarted(c, case, name, settings, kill_after, checkpoint_every):
@@ -108,6 +113,26 @@ def restart_line(found, what):
     steps, differ = found
     bits = f"**columns that differ: {', '.join(differ)}**" if differ else "every column but the clocks has the same bits"
     return f"`restart`: {what}: {steps} steps, {bits}."
+
+
+def strength(one, other):
+    """Mohr-Coulomb line through the peaks of the volume element at two confinements: phi [degrees], c / sigma_0; and psi at the
+    first one's peak [degrees], sin psi = -(d eps_v / d gamma) over 1 % of strain around it, in plane strain."""
+    circles = []
+    for run in (one, other):
+        h = run.history()
+        peak = int(np.argmax(-h["stress_yy"]))
+        sigma = np.array([-h["stress_yy"][peak], -h["stress_xx"][peak]]) / 1e5
+        circles.append((sigma.sum() / 2, (sigma[0] - sigma[1]) / 2))
+    (s1, t1), (s2, t2) = circles
+    sin_phi = (t2 - t1) / (s2 - s1)
+    phi = np.arcsin(sin_phi)
+    cohesion = (t1 - s1 * sin_phi) / np.cos(phi)
+    h = one.history()
+    peak = int(np.argmax(-h["stress_yy"]))
+    a, b = max(peak - 5, 0), min(peak + 5, len(h["step"]) - 1)
+    dx, dy = h["strain_xx"][b] - h["strain_xx"][a], h["strain_yy"][b] - h["strain_yy"][a]
+    return float(np.degrees(phi)), float(cohesion), float(np.degrees(np.arcsin((dx + dy) / (dx - dy))))
 
 
 def steps_of(folder):
