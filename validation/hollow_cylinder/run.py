@@ -55,7 +55,7 @@ HEADER = [
     "|---|---|---|---|---|---|---|---|---|---|---|",
 ]
 BANDS = [
-    "| row, sigma_int / sigma_0 | band starts at [deg] | to the radius [deg] | reaches [a] | thickness [a] | over the element size there | peak |",
+    "| row, step: sigma_int / sigma_0 | band starts at [deg] | to the radius [deg] | reaches [a] | thickness [a] | over the element size at 1.3 a | peak |",
     "|---|---|---|---|---|---|---|",
 ]
 
@@ -102,18 +102,22 @@ def element_size(run, radius):
 
 
 def band_lines(name, run):
-    step = step_at_four(run)
-    level = pressure_curve(run.folder).stress[step - 1]
-    try:
-        found = spirals_of_run(run.folder, last=step)
-    except ResultsError as error:
-        return [f"| `{name}`, {level:.2f} | none: {error} | | | | | |"]
+    """Rows of the table of bands: at 4 sigma_0, and at the end."""
     lines = []
-    for one in found:
+    for step in sorted({step_at_four(run), output_steps(run.folder)[-1]}):
+        level = f"`{name}`, step {step}: {pressure_curve(run.folder).stress[step - 1]:.2f}"
+        try:
+            found = spirals_of_run(run.folder, last=step)
+        except ResultsError:
+            lines.append(f"| {level} | none | | | | | |")
+            continue
         size = element_size(run, 1.3 * WALL)
-        thick = f"{one.thickness / WALL:.3f} +- {one.thickness_scatter / WALL:.3f} ({one.stations} profiles)" if one.stations else "one side only"
-        share = f"{one.thickness / size:.1f}" if one.stations else ""
-        lines.append(f"| `{name}`, {level:.2f} | {one.start:.0f} | {one.inclination:+.1f} | {one.reach:.2f} | {thick} | {share} | {one.peak:.3f} |")
+        for one in found:
+            thick, share = "one side only", ""
+            if one.stations:
+                thick = f"{one.thickness / WALL:.3f} +- {one.thickness_scatter / WALL:.3f} ({one.stations} profiles)"
+                share = f"{one.thickness / size:.1f}"
+            lines.append(f"| {level} | {one.start:.0f} | {one.inclination:+.1f} | {one.reach:.2f} | {thick} | {share} | {one.peak:.3f} |")
     return lines
 
 
@@ -131,9 +135,9 @@ def draw_curves(runs, names, file):
 
 
 def draw_maps(runs, names, file, reach=3.5):
-    """The inner part of the deformed meshes at 4 sigma_0, one scale."""
+    """The inner part of the deformed meshes at the end of the loading, one scale."""
     figure, panels = plt.subplots(1, len(names), figsize=(4.0 * len(names), 4.8), squeeze=False)
-    steps = {name: step_at_four(runs[name]) for name in names}
+    steps = {name: output_steps(runs[name].folder)[-1] for name in names}
     fields = {name: read_step(runs[name].folder, steps[name]) for name in names}
     top = max(np.quantile(field.fields["strain_invariant"], 0.998) for field in fields.values())
     for axes, name in zip(panels[0], names):
