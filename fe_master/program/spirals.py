@@ -144,7 +144,10 @@ def measure_spirals(positions, values, angle=90.0, wall=None, shortest=0.2, prom
             continue
         slope, theta = np.polyfit(chain[:, 0] - np.log(wall), chain[:, 1], 1)
         inclination = np.degrees(np.arctan(slope))
-        widths = widths_along(field, chain, inclination, spacing)
+        # Near a plane of symmetry a band merges with its reflection, and past it goes on as that.
+        planes = np.minimum(np.abs(chain[:, 1]), np.abs(np.radians(angle) - chain[:, 1]))
+        beside = np.logical_or.accumulate(np.exp(chain[:, 0]) * planes < 0.25 * wall)
+        widths = widths_along(field, chain[~beside], inclination, spacing)
         thickness = (widths.mean(), widths.std()) if len(widths) else (np.nan, np.nan)
         spirals.append(Spiral(float(np.degrees(theta)), float(inclination), float(np.exp(chain[-1, 0]) / wall), *map(float, thickness),
                               len(widths), float(chain[:, 2].max())))
