@@ -192,6 +192,7 @@ def report(c):
     runs = existing(c, RUNS)
     if not runs:
         raise campaign.CampaignError(f"{c.runs}: no row has results; run one first")
+    c.processor_seconds = sum(run.processor_seconds for run in runs.values())
     specimens = [name for name in runs if not RUNS[name].path]
     paper = [name for name in PAPER if name in runs]
     if paper:

@@ -66,6 +66,12 @@ def curve_of(name, run):
     return curve
 
 
+def first_at(curve, stress):
+    """Strain where the stress is first reached: a curve past its limit has it twice."""
+    k = int(np.argmax(curve.stress >= stress))
+    return float(np.interp(stress, curve.stress[max(k - 1, 0):k + 1], curve.strain[max(k - 1, 0):k + 1]))
+
+
 def memory(run):
     file = run.folder / "summary.json"
     if not file.exists():
@@ -76,7 +82,7 @@ def memory(run):
 
 def table_row(name, run):
     curve, paid, mesh = curve_of(name, run), cost(run), read_mesh(run.folder)
-    at_four = f"{np.interp(4.0, curve.stress, curve.strain):.4f}" if curve.stress.max() >= 4.0 else "-"
+    at_four = f"{first_at(curve, 4.0):.4f}" if curve.stress.max() >= 4.0 else "-"
     cells = [f"`{name}`", f"{len(mesh.elements)}, {mesh.points.shape[0] * mesh.points.shape[1]}", how_it_ended(run),
              f"{curve.stress[-1]:.2f} (most {curve.stress.max():.2f})", f"{at_four}, {curve.strain[-1]:.4f}",
              f"{paid.evaluations / paid.steps:.2f}, {paid.most}", paid.rejected, f"{paid.dem_steps:.3g}", f"{paid.wall:.0f}",
@@ -152,6 +158,7 @@ def report(c):
     runs = existing(c, RUNS)
     if not runs:
         raise campaign.CampaignError(f"{c.runs}: no row has results; run one first")
+    c.processor_seconds = sum(run.processor_seconds for run in runs.values())
     with_fields = {name: run for name, run in runs.items() if output_steps(run.folder)}
     shown = [name for name in PAPER if name in with_fields] or list(with_fields)
     if shown:
