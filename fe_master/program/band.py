@@ -149,6 +149,31 @@ def measure_band(positions, values):
     return Band(found[:, 3].mean(), found[:, 3].std(), inclination, centre, len(found), found[:, 2].mean())
 
 
+def mean_profile(positions, values, band, reach):
+    """The field across a band, averaged along it: distance from the band (n,) and mean value (n,), from -reach to reach. Each
+    profile is laid with its middle at half height at 0."""
+    positions, values = np.reshape(positions, (-1, 2)), np.ravel(values)
+    field = interpolator(positions, values)
+    along, across = axes_of(band.inclination)
+    span = np.linalg.norm(np.ptp(positions, axis=0))
+    spacing = np.sqrt(np.prod(np.ptp(positions, axis=0)) / len(positions)) / 2
+    s = np.arange(-reach, reach + spacing / 8, spacing / 4)
+    profiles_found = []
+    for start in band.centre + np.arange(-span, span, spacing)[:, None] * along:
+        wide = np.arange(-span, span, spacing / 4)
+        profile = field(start + wide[:, None] * across)
+        if not np.isfinite(profile[np.argmin(np.abs(wide))]):
+            continue
+        measured = width_at_half_height(wide, profile)
+        if measured and abs(measured[3]) < band.thickness:
+            profiles_found.append(np.interp(s + measured[3], wide, profile))
+    if not profiles_found:
+        raise ResultsError("no profile across the band falls to half of its peak on both sides")
+    sums = np.array(profiles_found)
+    counts = np.isfinite(sums).sum(axis=0)
+    return s, np.where(counts > 0, np.nansum(sums, axis=0) / np.maximum(counts, 1), np.nan)
+
+
 def band_of_run(folder, first=None, last=None):
     """Band of the strain up to an output step (default: the last), or since the output step `first`."""
     mesh, step = read_mesh(folder), read_step(folder, last)

@@ -1,10 +1,12 @@
 #!/usr/bin/python3
-"""Figures of a biaxial run: curve, maps on the deformed mesh, cost of the steps.
+"""Figures of a run: curve, maps on the deformed mesh, cost of the steps.
 
     fe_master/program/plot.py DIR [--ve DIR2] [--out FOLDER] [--steps N ...]
 
-Axial stress over sigma_0 against nominal axial strain, compression positive. --ve lays the curve of the single volume
-element (`femxdem ve path`) over it. The maps show the second invariant of the logarithmic strain |dev ln U|, the
+The curve is that of the monitors: axial stress over sigma_0 against nominal axial strain (reaction_y and displacement_y of an
+edge), compression positive; else the pressure on an edge over sigma_0 against that edge's displacement (pressure,
+displacement_x and displacement_y); else the load factor against time. --ve lays the curve of the single volume element
+(`femxdem ve path`) over an axial one. --window X0 X1 Y0 Y1 maps a part of the body. The maps show the second invariant of the logarithmic strain |dev ln U|, the
 volumetric strain, the porosity and the seconds that the DEM took, at the last output step or at the given ones.
 """
 
@@ -20,7 +22,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.ticker import MaxNLocator
 
-from results import (ResultsError, axial_curve, natural_coordinates, path_curve, read_history, read_mesh, read_step,
+from results import (ResultsError, natural_coordinates, path_curve, read_history, read_mesh, read_step, run_curve,
                      shape_functions)
 
 LABELS = {
@@ -49,15 +51,19 @@ def outlines(mesh, displacement):
     return (mesh.nodes + displacement)[mesh.elements[:, around]]
 
 
-def draw_map(axes, mesh, step, name):
-    """A point field on the deformed mesh: one colour for each Gauss point where there are four, else for each element."""
+def draw_map(axes, mesh, step, name, window=None, limits=None):
+    """A point field on the deformed mesh: one colour for each Gauss point where there are four, else for each element; all
+    of it, or the window (x0, x1, y0, y1); colours between `limits`, or between the extremes."""
     values = step.fields[name]
     has_quarters = values.shape[1] == 4
     shapes = quarters(mesh, step.displacement).reshape(-1, 4, 2) if has_quarters else outlines(mesh, step.displacement)
     filled = PolyCollection(shapes, array=values.ravel() if has_quarters else values.mean(axis=1), cmap="viridis")
+    filled.set_clim(limits)
     axes.add_collection(filled)
     axes.add_collection(PolyCollection(outlines(mesh, step.displacement), facecolor="none", edgecolor="0.6", linewidth=0.15))
     axes.autoscale_view()
+    if window:
+        axes.set(xlim=window[:2], ylim=window[2:])
     axes.set_aspect("equal")
     axes.set_axis_off()
     bar = axes.figure.colorbar(filled, ax=axes, orientation="horizontal", pad=0.03, label=LABELS.get(name, name))
@@ -65,11 +71,12 @@ def draw_map(axes, mesh, step, name):
 
 
 def draw_curves(axes, curves):
-    """Curves of results.axial_curve and results.path_curve over one another."""
+    """Curves of results.run_curve and results.path_curve over one another."""
     for curve, style in zip(curves, ("-o", "--", "-s", "-^", "-v")):
         axes.plot(100 * curve.strain, curve.stress, style, markersize=3, linewidth=1, label=curve.label)
-    axes.set_xlabel("axial strain [%] (nominal, compression positive)")
-    axes.set_ylabel(f"axial stress {curves[0].unit} (compression positive)")
+    axes.set_xlabel(curves[0].against)
+    sign = "" if curves[0].of == "load factor" else "(compression positive)"
+    axes.set_ylabel(f"{curves[0].of} {curves[0].unit} {sign}".strip())
     axes.grid(alpha=0.3)
     axes.legend()
 
@@ -92,22 +99,24 @@ def save(figure, file):
 
 
 def plot_curve(folder, out, ve_folder=None):
-    curves = [axial_curve(folder, label="boundary value problem (FEM x DEM)")]
+    curves = [run_curve(folder, label="boundary value problem (FEM x DEM)")]
     if ve_folder:
+        if curves[0].of != "axial stress":
+            raise ResultsError(f"{folder}: a curve of {curves[0].of} has no counterpart of a single volume element; leave --ve out")
         curves.append(path_curve(ve_folder))
     figure, axes = plt.subplots(figsize=(6, 4))
     draw_curves(axes, curves)
     return save(figure, out / "curve.png")
 
 
-def plot_maps(folder, out, number=None):
+def plot_maps(folder, out, number=None, window=None):
     mesh, step = read_mesh(folder), read_step(folder, number)
     names = [name for name in LABELS if name in step.fields and np.ptp(step.fields[name]) > 0]
     if not names:
         return []
     figure, axes = plt.subplots(1, len(names), figsize=(3.2 * len(names), 6), squeeze=False)
     for one, name in zip(axes[0], names):
-        draw_map(one, mesh, step, name)
+        draw_map(one, mesh, step, name, window)
     figure.suptitle(f"step {step.number}, load factor {step.load_factor:.4g}", y=0.9)
     return [save(figure, out / f"maps_{step.number:06d}.png")]
 
@@ -118,12 +127,12 @@ def plot_cost(folder, out):
     return save(figure, out / "convergence.png")
 
 
-def plot_run(folder, out, ve_folder=None, steps=(None,)):
+def plot_run(folder, out, ve_folder=None, steps=(None,), window=None):
     """All figures of a run; returns their files."""
     out.mkdir(parents=True, exist_ok=True)
     files = [plot_curve(folder, out, ve_folder), plot_cost(folder, out)]
     for number in steps:
-        files += plot_maps(folder, out, number)
+        files += plot_maps(folder, out, number, window)
     return files
 
 
@@ -133,9 +142,10 @@ def main():
     parser.add_argument("--ve", metavar="DIR2", type=Path, help="folder of `femxdem ve path`, drawn over the curve")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="where the figures go (default: DIR)")
     parser.add_argument("--steps", metavar="N", type=int, nargs="+", default=[None], help="output steps to map")
+    parser.add_argument("--window", metavar="X", type=float, nargs=4, help="part of the body to map: x0 x1 y0 y1")
     arguments = parser.parse_args()
     try:
-        files = plot_run(arguments.folder, arguments.out or arguments.folder, arguments.ve, arguments.steps)
+        files = plot_run(arguments.folder, arguments.out or arguments.folder, arguments.ve, arguments.steps, arguments.window)
     except ResultsError as error:
         sys.exit(f"plot.py: {error}")
     for file in files:

@@ -154,17 +154,23 @@ class Curve:
     stress: np.ndarray  #: axial over sigma_0, or in Pa without confinement, compression positive
     label: str
     unit: str = r"/ $\sigma_0$"  #: of the stress, as on an axis
+    of: str = "axial stress"  #: what `stress` holds
+    against: str = "axial strain [%] (nominal, compression positive)"  #: what 100 times `strain` is, as on an axis
 
 
-def _curve(strain, stress, case, label):
+def _curve(strain, stress, case, label, **names):
     sigma_0 = confining_stress(case)
-    return Curve(strain, stress / sigma_0, label) if sigma_0 else Curve(strain, stress, label, "[Pa]")
+    return Curve(strain, stress / sigma_0, label, **names) if sigma_0 else Curve(strain, stress, label, "[Pa]", **names)
+
+
+def _monitored(case, quantity, edge):
+    """Name of the monitor of a quantity on an edge, or nothing."""
+    return next((m["name"] for m in case.get("monitor", []) if m["quantity"] == quantity and m.get("edge") == edge), None)
 
 
 def _monitor(case, quantity, edge, folder):
-    for monitor in case.get("monitor", []):
-        if monitor["quantity"] == quantity and monitor.get("edge") == edge:
-            return monitor["name"]
+    if name := _monitored(case, quantity, edge):
+        return name
     raise ResultsError(f"{folder}/case.toml: no [[monitor]] with quantity = \"{quantity}\" on edge \"{edge}\"; add it and run again")
 
 
@@ -183,11 +189,41 @@ def axial_curve(folder, edge="top", label=None, nominal=False):
     return _curve(shortening / height, -reaction / width, case, label or str(folder))
 
 
-def path_curve(folder, component="yy", label="single volume element"):
-    """Axial stress over sigma_0 against nominal axial strain of `femxdem ve path`."""
+def pressure_curve(folder, edge="inner", label=None):
+    """Pressure on an edge over sigma_0 against the length of the mean displacement of that edge [m], from its monitors. Of a
+    quarter of a circle that length is 2 sqrt(2) / pi of a uniform radial displacement."""
+    case, history = read_case(folder), read_history(folder)
+    pressure = history[_monitor(case, "pressure", edge, folder)]
+    moved = np.hypot(*(history[_monitor(case, f"displacement_{axis}", edge, folder)] for axis in "xy"))
+    kept = [load["value"] for load in case["load"] if load["kind"] == "pressure" and not load.get("table")]
+    sigma_0 = kept[0] if kept and kept[0] else case.get("ve", {}).get("confining_stress", 0)
+    names = {"of": f"pressure on {edge}", "against": f"mean displacement of {edge} [cm]"}
+    if sigma_0:
+        return Curve(moved, pressure / sigma_0, label or str(folder), **names)
+    return Curve(moved, pressure, label or str(folder), "[Pa]", **names)
+
+
+def run_curve(folder, label=None):
+    """The curve of any run: stress of the axial edge that is monitored, else the pressure of an edge against its
+    displacement, else the load factor against time."""
+    case = read_case(folder)
+    edges = list(dict.fromkeys(m["edge"] for m in case.get("monitor", []) if m.get("edge")))
+    for edge in edges:
+        if _monitored(case, "reaction_y", edge) and _monitored(case, "displacement_y", edge):
+            return axial_curve(folder, edge, label)
+    for edge in edges:
+        if all(_monitored(case, quantity, edge) for quantity in ("pressure", "displacement_x", "displacement_y")):
+            return pressure_curve(folder, edge, label)
+    history = read_history(folder)
+    return Curve(history["time"] / 100, history["load_factor"], label or str(folder), "", "load factor", "time [s]")
+
+
+def path_curve(folder, component="yy", label="single volume element", nominal=False):
+    """Axial stress over sigma_0 against nominal axial strain of `femxdem ve path`; `nominal`: force over initial width."""
     case, history = read_case(folder), read_history(folder)
     missing = [name for name in (f"strain_{component}", f"stress_{component}") if name not in history]
     if missing:
         raise ResultsError(f"{folder}/history.csv: no column {missing[0]}; give the folder of `femxdem ve path`")
     strain = 1 - np.exp(history[f"strain_{component}"])
-    return _curve(strain, -history[f"stress_{component}"], case, label)
+    width = np.exp(history["strain_xx"]) if nominal else 1.0
+    return _curve(strain, -history[f"stress_{component}"] * width, case, label)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "fe_master" / "program"))
-from band import axes_of, band_of_run, measure_band
+from band import axes_of, band_of_run, mean_profile, measure_band
 from results import ResultsError
 from sample_run import gauss_points, rectangle, write_run
 
@@ -57,6 +57,12 @@ class Synthetic(unittest.TestCase):
         x = structured()
         values = gaussian(x, 51, 0.3) + 0.1 * np.random.default_rng(2).normal(size=len(x))
         self.expect(measure_band(x, values), 51, 0.3, relative=0.08, degrees=1)
+
+    def test_mean_profile_is_the_profile(self):
+        x = structured()
+        values = gaussian(x, 51, 0.3)
+        s, profile = mean_profile(x, values, measure_band(x, values), 0.4)
+        np.testing.assert_allclose(profile, np.exp(-4 * np.log(2) * (s / 0.3) ** 2), atol=0.03)
 
     def test_a_homogeneous_field_has_no_band(self):
         for values in (np.ones(len(structured())), 1 + 0.2 * structured()[:, 1]):

@@ -9,8 +9,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "fe_master" / "program"))
 from plot import plot_run, quarters
-from results import (ResultsError, axial_curve, deformed_points, logarithmic_strain, natural_coordinates, path_curve, read_mesh, read_step,
-                     shape_functions, strain_invariant)
+from results import (ResultsError, axial_curve, deformed_points, logarithmic_strain, natural_coordinates, path_curve, pressure_curve, read_mesh,
+                     read_step, run_curve, shape_functions, strain_invariant)
 from sample_run import write_run
 
 G = np.array([[0.02, 0.1], [0.0, -0.05]])
@@ -58,6 +58,50 @@ class Files(unittest.TestCase):
         curve = path_curve(self.folder)
         np.testing.assert_allclose(curve.strain, [1 - np.exp(-0.1)], rtol=1e-14)
         np.testing.assert_allclose(curve.stress, [2.0], rtol=1e-14)
+
+    def test_path_curve_as_force_over_initial_width(self):
+        (self.folder / "history.csv").write_text("step,strain_xx,strain_yy,stress_yy\n1,0.02,-0.1,-4e5\n")
+        np.testing.assert_allclose(path_curve(self.folder, nominal=True).stress, [2.0 * np.exp(0.02)], rtol=1e-14)
+
+    def cylinder(self):
+        """The folder with the monitors of a cylinder: no edge has a top's."""
+        case = self.folder / "case.toml"
+        monitors = "".join(f'[[monitor]]\nname = "{n}"\nquantity = "{q}"\nedge = "inner"\n' for n, q in (
+            ("p", "pressure"), ("ux", "displacement_x"), ("uy", "displacement_y")))
+        case.write_text(case.read_text().split("[[monitor]]")[0] + monitors)
+        (self.folder / "history.csv").write_text("step,time,load_factor,evaluations,residual,p,ux,uy\n"
+                                                 "1,0.1,0.1,2,1e-3,4e5,0.03,0.04\n2,0.2,0.2,2,1e-3,6e5,0.3,0.4\n")
+
+    def test_curve_of_a_cylinder_is_pressure_against_displacement_of_the_wall(self):
+        self.cylinder()
+        for curve in (pressure_curve(self.folder), run_curve(self.folder)):
+            np.testing.assert_allclose(curve.strain, [0.05, 0.5], rtol=1e-14)
+            np.testing.assert_allclose(curve.stress, [2.0, 3.0], rtol=1e-14)
+            self.assertEqual(curve.of, "pressure on inner")
+
+    def test_the_pressure_that_is_kept_is_sigma_0_wherever_it_stands(self):
+        self.cylinder()
+        case = self.folder / "case.toml"
+        loaded = '[[load]]\nedge = "inner"\nkind = "pressure"\nvalue = 1.0\ntable = [[0.0, 1.0], [1.0, 4.0]]\n'
+        case.write_text(case.read_text().replace("[[load]]", loaded + "[[load]]", 1))
+        np.testing.assert_allclose(pressure_curve(self.folder).stress, [2.0, 3.0], rtol=1e-14)
+
+    def test_curve_without_monitors_is_the_load_factor(self):
+        case = self.folder / "case.toml"
+        case.write_text(case.read_text().split("[[monitor]]")[0])
+        np.testing.assert_allclose(run_curve(self.folder).stress, [0.0, 0.0], atol=0)
+        self.assertEqual(run_curve(self.folder).of, "load factor")
+
+    def test_a_case_without_a_top_gets_all_figures(self):
+        self.cylinder()
+        with tempfile.TemporaryDirectory() as out:
+            files = plot_run(self.folder, Path(out), steps=[1], window=(0, 0.5, 0, 1))
+            self.assertEqual([file.name for file in files], ["curve.png", "convergence.png", "maps_000001.png"])
+
+    def test_a_volume_element_is_no_counterpart_of_a_cylinder(self):
+        self.cylinder()
+        with self.assertRaisesRegex(ResultsError, "leave --ve out"):
+            plot_run(self.folder, self.folder / "figures", self.folder)
 
     def test_points_move_with_an_affine_deformation(self):
         mesh = read_mesh(self.folder)

@@ -1,0 +1,22 @@
+// Quarter of a hollow cylinder, b/a = 5: 29 elements along the radius, each 6 % longer than the last, 30 around.
+a = 1; b = 5;
+Point(1) = {0, 0, 0};
+Point(2) = {a, 0, 0};
+Point(3) = {b, 0, 0};
+Point(4) = {0, b, 0};
+Point(5) = {0, a, 0};
+Line(1) = {2, 3};
+Circle(2) = {3, 1, 4};
+Line(3) = {5, 4};
+Circle(4) = {2, 1, 5};
+Curve Loop(1) = {1, 2, -3, -4};
+Plane Surface(1) = {1};
+Transfinite Curve {1, 3} = 29 + 1 Using Progression 1.06;
+Transfinite Curve {2, 4} = 30 + 1;
+Transfinite Surface {1};
+Recombine Surface {1};
+Physical Curve("start") = {1};
+Physical Curve("outer") = {2};
+Physical Curve("end") = {3};
+Physical Curve("inner") = {4};
+Physical Surface("soil") = {1};
