@@ -168,13 +168,16 @@ void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
   const Point& point = points_[trial.first];
   CompactCell& cell = *trial.cell;
   cell = *point.cell;
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps);
+  const CompactCell::Sampling sampling =
+      answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
+                             : CompactCell::Sampling{};
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
   if (end.failure) {
     trial.response.failure = Failure{trial.first, *end.failure, kSmallerStep};
     return;
   }
   trial.response.report = cell.trial_report();
-  Strained found{tensor(cell.stress()), tensor(cell.stretch()), {}};
+  Strained found{tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
   if (wanted == Operator::elastic) found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
   judge(options_, trial.straining, trial.first, found, trial.response);
 }
