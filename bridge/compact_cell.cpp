@@ -23,22 +23,29 @@ double rate(const Row3& L) {
   return std::sqrt(sum) / 2;
 }
 
-/// The mean of a quantity over time from samples, by the trapezoidal rule.
+/// The weighted mean of a quantity over `steps` steps from samples, by the trapezoidal rule. mean_stress.py does the
+/// same operations in the same order.
 class Mean {
  public:
+  Mean(long steps, double late) : steps_(static_cast<double>(steps)), late_(late) {}
   void add(long step, const Row3& value) {
-    for (std::size_t k = 0; count_ > 0 && k < 9; ++k)
-      sum_[k] += 0.5 * static_cast<double>(step - last_step_) * (last_[k] + value[k]);
-    last_ = value, last_step_ = step;
+    const double weight = 1 + late_ * (2 * static_cast<double>(step) / steps_ - 1);
+    for (std::size_t k = 0; k < 9; ++k) {
+      const double weighted = weight * value[k];
+      if (count_ > 0) sum_[k] += 0.5 * static_cast<double>(step - last_step_) * (last_[k] + weighted);
+      last_[k] = weighted;
+    }
+    last_step_ = step;
     ++count_;
   }
-  Row3 over(long steps) const {
+  Row3 mean() const {
     Row3 mean;
-    for (std::size_t k = 0; k < 9; ++k) mean[k] = sum_[k] / static_cast<double>(steps);
+    for (std::size_t k = 0; k < 9; ++k) mean[k] = sum_[k] / steps_;
     return mean;
   }
 
  private:
+  double steps_, late_;
   Row3 sum_{}, last_{};
   long last_step_ = 0, count_ = 0;
 };
@@ -88,22 +95,23 @@ std::size_t CompactCell::memory() const { return block_->memory(); }
 std::size_t CompactCell::size() const { return block_->header().spheres; }
 std::size_t CompactCell::contacts() const { return block_->header().contacts; }
 
-CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, long sample_every) {
+CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, Sampling sampling) {
   const auto started = std::chrono::steady_clock::now();
   Deformed result;
   result.mean_stress.fill(std::numeric_limits<double>::quiet_NaN());
   if (steps > 0) block_->header().L = L;
-  Mean mean;
+  Mean mean(steps, sampling.late);
+  const bool sampled = sampling.every > 0 && steps > 0;
   try {
-    if (sample_every > 0) mean.add(0, stress());
+    if (sampled) mean.add(0, stress());
     for (long k = 1; k <= steps; ++k) {
       step(*block_);
-      if (sample_every > 0 && (k % sample_every == 0 || k == steps)) mean.add(k, stress());
+      if (sampled && (k % sampling.every == 0 || k == steps)) mean.add(k, stress());
     }
   } catch (const std::runtime_error& reason) {
     result.failure = reason.what();
   }
-  if (sample_every > 0 && !result.failure) result.mean_stress = steps > 0 ? mean.over(steps) : stress();
+  if (sampling.every > 0 && !result.failure) result.mean_stress = sampled ? mean.mean() : stress();
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - started;
   trial_ = {static_cast<double>(steps), rate(L), taken.count()};
   return result;

@@ -61,10 +61,15 @@ class CompactCell {
     std::optional<std::string> failure;   ///< why the cell cannot go on; it is then to be thrown away
     std::array<double, 9> mean_stress{};  ///< over the steps by the trapezoidal rule, symmetrised [Pa]; see deform
   };
+  /// Which stresses of a deform the mean takes, and how they weigh.
+  struct Sampling {
+    long every = 0;   ///< at the start, after every so many steps and at the end; 0: no mean (NaN)
+    double late = 0;  ///< weight 1 + late (2 t / T - 1), 0 to 1: its centre is at t = (1/2 + late / 6) T
+  };
   /// Holds the velocity gradient L [1/s] for `steps` DEM steps of info().time_step: the cell ends at
-  /// (I + L time_step)^steps times where it was. Nothing happens for steps = 0. `sample_every` > 0 takes the stress at
-  /// the start, after every so many steps and at the end for the mean; 0: no mean (NaN).
-  Deformed deform(const std::array<double, 9>& L, long steps, long sample_every = 0);
+  /// (I + L time_step)^steps times where it was. Nothing happens for steps = 0: the mean is the stress.
+  Deformed deform(const std::array<double, 9>& L, long steps, Sampling sampling);
+  Deformed deform(const std::array<double, 9>& L, long steps) { return deform(L, steps, Sampling{}); }
 
   /// Replaces the cell by the shortest one of the same lattice, as deform does by itself before a sheared cell becomes
   /// too narrow: stress and contacts stay to round-off, so that shear of any size goes on. Whether it was another.

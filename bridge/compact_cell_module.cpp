@@ -40,12 +40,12 @@ py::dict info(const CompactCell& cell) {
 
 /// Raises RuntimeError with the sentence of a failure.
 py::array_t<double> deform(CompactCell& cell, const py::array_t<double, py::array::c_style | py::array::forcecast>& L,
-                           long steps, long sample_every) {
+                           long steps, long sample_every, double late) {
   CompactCell::Deformed deformed;
   const auto numbers = tensor(L);
   {
     const py::gil_scoped_release released;
-    deformed = cell.deform(numbers, steps, sample_every);
+    deformed = cell.deform(numbers, steps, {sample_every, late});
   }
   if (deformed.failure) throw std::runtime_error(*deformed.failure);
   return array(deformed.mean_stress, {3, 3});
@@ -71,7 +71,7 @@ PYBIND11_MODULE(compact_cell, module) {
       .def("to_scene", [](const CompactCell& c) { return py::bytes(c.to_scene()); })
       .def("copy", [](const CompactCell& c) { return CompactCell(c); })
       .def("assign", [](CompactCell& c, const CompactCell& other) { c = other; })
-      .def("deform", &deform, py::arg("L"), py::arg("steps"), py::arg("sample_every") = 0)
+      .def("deform", &deform, py::arg("L"), py::arg("steps"), py::arg("sample_every") = 0, py::arg("late") = 0.0)
       .def("stress",
            [](const CompactCell& c) {
              return array(c.stress(), {3, 3});

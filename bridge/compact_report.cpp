@@ -152,6 +152,9 @@ PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   r["contacts"] = h.contacts;
   r["coordination"] = 2.0 * h.contacts / h.spheres;
   r["stress_asymmetry"] = norm(skew) / std::max(2 * norm(s), 1e-300);
+  const Row3 end = symmetrised(s);
+  r["end_stress_xx"] = end[0], r["end_stress_yy"] = end[4], r["end_stress_zz"] = end[8];
+  r["end_stress_xy"] = end[1], r["end_stress_yz"] = end[5], r["end_stress_zx"] = end[6];
   r["inertial_number"] = trial.rate * time_scale(h, pressure(s));
   r["unbalanced_force"] = unbalanced_force(a);
   r["porosity"] = 1 - h.solid_volume / determinant(h.H);

@@ -145,7 +145,8 @@ void CompactVolumeElements::group(const std::vector<Straining>& plans) {
     trial.first = p;
     trial.straining = plans[p];
     trial.cell = spare_cell();
-    trial.checked = plans[p].steps > 0 && referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
+    trial.checked =
+        plans[p].steps > 0 && referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
   }
 }
 
@@ -174,11 +175,14 @@ void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
   const Point& point = points_[trial.first];
   CompactCell& cell = *trial.cell;
   cell = *point.cell;
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps);
+  const CompactCell::Sampling sampling =
+      answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
+                             : CompactCell::Sampling{};
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
   trial.failure = end.failure;
   if (trial.failure) return;
   trial.report = cell.trial_report();
-  trial.found = {tensor(cell.stress()), tensor(cell.stretch()), {}};
+  trial.found = {tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
   if (wanted == Operator::elastic)
     trial.found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
 }

@@ -122,8 +122,14 @@ VeInfo Engine::info(int ve) {
 }
 
 void Engine::deform(int ve, Slot& slot) {
-  in_python(
-      [&] { engine_.attr("deform")(ve, view(slot.velocity_gradient).attr("reshape")(3, 3), py::int_(slot.steps)); });
+  in_python([&] {
+    const py::object deform = engine_.attr("deform"), L = view(slot.velocity_gradient).attr("reshape")(3, 3);
+    if (slot.sample_every == 0) {
+      deform(ve, L, py::int_(slot.steps));
+    } else {
+      deform(ve, L, py::int_(slot.steps), py::int_(slot.sample_every), slot.late, view(slot.mean_stress));
+    }
+  });
 }
 
 void Engine::measure(int ve, Slot& slot) {

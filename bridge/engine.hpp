@@ -37,7 +37,7 @@ class Engine {
   void write_back(int ve, std::string_view exported);
   std::string referee(int ve, std::string_view exported, std::array<double, 9> velocity_gradient, long steps);
   VeInfo info(int ve);
-  /// Holds the slot's velocity gradient for its number of steps.
+  /// Holds the slot's velocity gradient for its number of steps; the mean stress into the slot where it is asked for.
   void deform(int ve, Slot& slot);
   /// Stress, stretch and what judges a trial of the report into the slot.
   void measure(int ve, Slot& slot);

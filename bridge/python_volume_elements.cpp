@@ -89,6 +89,8 @@ Straining PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {
   const Straining straining = plan_straining(options_, points_[index], slot.info.time_step, index, F);
   slot.steps = straining.steps;
   slot.velocity_gradient = straining.velocity_gradient;
+  slot.sample_every = answers_mean(options_) ? kSampleEvery : 0;
+  slot.late = lateness(options_, straining.steps);
   return straining;
 }
 
@@ -128,7 +130,7 @@ void PythonVolumeElements::read(std::size_t index, const Straining& straining, O
     response.failure = Failure{index, slot.sentence.data(), kSmallerStep};
     return;
   }
-  Strained found{tensor(slot.stress), tensor(slot.stretch), {}};
+  Strained found{tensor(answers_mean(options_) ? slot.mean_stress : slot.stress), tensor(slot.stretch), {}};
   if (wanted == Operator::elastic) found.stiffness = Eigen::Map<const Tensor4>(slot.stiffness.data());
   judge(options_, straining, index, found, response);
 }

@@ -20,12 +20,24 @@ struct VolumeElementOptions {
   bool freeze_steps = true;           ///< a load step's trials take as many DEM steps as its first
   double max_unbalanced_force = 0.2;  ///< an answer above is refused [-]
   double max_increment = 0.2;         ///< largest |ln U_inc| of one trial [-]
-  bool relaxed = false;               ///< the elastic stiffness is the relaxed one, not Eq. (2)
-  bool quantised = false;             ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
-  bool serialise = false;             ///< YADE's volume elements are saved and restored at every trial, not forked
+  /// Where in the trial its stress belongs: 1, at its end; 1/2 to 2/3: it is the mean over the trial, which belongs
+  /// there (later ones weigh more beyond 1/2: 1 + late (2 t / T - 1)) [-].
+  double answer_at = 1;
+  bool relaxed = false;    ///< the elastic stiffness is the relaxed one, not Eq. (2)
+  bool quantised = false;  ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
+  bool serialise = false;  ///< YADE's volume elements are saved and restored at every trial, not forked
   /// Where remarks go: a trial that was repeated, a fork that was refused.
   std::function<void(std::string_view)> say = [](std::string_view) {};
 };
+
+inline constexpr long kSampleEvery = 1;  ///< DEM steps between the stresses of a mean
+
+/// Whether a trial answers with a mean, and how late its stresses weigh then.
+inline bool answers_mean(const VolumeElementOptions& options) { return options.answer_at < 1; }
+/// So that the mean of what is linear in time, by the trapezoidal rule over `steps`, is its value at answer_at.
+inline double lateness(const VolumeElementOptions& options, long steps) {
+  return (6 * options.answer_at - 3) / (1 + 2 / (static_cast<double>(steps) * static_cast<double>(steps)));
+}
 
 /// In which class of strain and of pressure a cell is; where it leaves it, its contact network may be another.
 using NetworkLevel = std::array<int, 2>;
@@ -58,7 +70,7 @@ Straining plan_straining(const VolumeElementOptions& options, StrainedPoint& poi
 
 /// What an engine has found at the end of a straining, in the frame of the stretch.
 struct Strained {
-  Tensor2 stress;                    ///< Cauchy, symmetric [Pa]
+  Tensor2 stress;                    ///< its answer: Cauchy, symmetric, of the end or the mean [Pa]
   Tensor2 stretch;                   ///< deformation gradient of the cell
   std::optional<Tensor4> stiffness;  ///< [Pa], when asked for
 };

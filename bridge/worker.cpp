@@ -301,6 +301,7 @@ void Worker::deform_one(std::size_t index, std::int64_t stiffness) {
   try {
     if (slot.steps > 0) engine_.deform(ve, slot);
     engine_.measure(ve, slot);
+    if (slot.steps == 0) slot.mean_stress = slot.stress;
     if (stiffness != kNoStiffness) engine_.stiffness(ve, slot, stiffness == kRelaxed);
     slot.outcome = Outcome::answered;
   } catch (const std::exception& error) {

@@ -86,9 +86,12 @@ struct Slot {
   Task task = Task::deform;
   std::array<double, 9> velocity_gradient{};  ///< [1/s]
   std::int64_t steps = 0;
+  std::int64_t sample_every = 0;  ///< DEM steps between the stresses of the mean; 0: no mean
+  double late = 0;                ///< how these weigh: 1 + late (2 t / T - 1)
   // from the worker
   Outcome outcome = Outcome::none;
-  std::array<double, 9> stress{};                     ///< Cauchy [Pa], tension positive
+  std::array<double, 9> stress{};                     ///< Cauchy, of the end [Pa], tension positive
+  std::array<double, 9> mean_stress{};                ///< over the trial [Pa], when asked for
   std::array<double, kReportFields.size()> report{};  ///< complete once it is committed, added, saved or loaded
   std::array<double, 9> stretch{};                    ///< deformation gradient of the cell from the reference
   std::array<double, 81> stiffness{};                 ///< [Pa], when asked for

@@ -20,9 +20,10 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
                                        spheres; the export of the end
     info(ve) -> dict                   {"time_step": s, "time_scale": a sqrt(rho/p) s, "volume": m^3, "spheres": n,
                                         "mean_diameter": m, "mean_stress": Pa (compression positive)}
-    deform(ve, velocity_gradient, steps)   hold velocity_gradient L (3, 3) [1/s] for `steps` DEM steps of info's
-                                       time_step: the cell ends at (I + L time_step)^steps times where it was; stress
-                                       and report belong to exactly that end
+    deform(ve, velocity_gradient, steps[, sample_every, late, out_mean])   hold velocity_gradient L (3, 3) [1/s] for
+                                       `steps` DEM steps of info's time_step: the cell ends at (I + L time_step)^steps
+                                       times where it was; stress and report belong to exactly that end. out_mean: (9,)
+                                       mean of the Cauchy stress over the trial [Pa], see mean_stress.py
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report: what judges and
                                        counts a trial, NaN where it costs more; (9,) the cell's deformation gradient
                                        from the reference (adopted) state
@@ -41,6 +42,8 @@ import signal
 import time
 
 import numpy as np
+
+import mean_stress
 
 
 class DummyEngine:
@@ -98,13 +101,27 @@ class DummyEngine:
             "mean_stress": self.cells[ve]["confining_stress"],
         }
 
-    def deform(self, ve, velocity_gradient, steps):
+    def deform(self, ve, velocity_gradient, steps, sample_every=0, late=0.0, out_mean=None):
         cell = self.cells[ve]
         step = np.eye(3) + np.asarray(velocity_gradient).reshape(3, 3) * cell["time_step"]
+        if sample_every > 0:
+            out_mean[:] = self._mean(ve, step, steps, sample_every, late)
         cell["F"] = np.linalg.matrix_power(step, steps) @ cell["F"]
         cell["steps"] = steps
         if cell["fault"] != "none" and np.abs(cell["F"] - np.eye(3)).max() > cell["fault_strain"]:
             self._fault(ve, cell["fault"])
+
+    def _mean(self, ve, step, steps, sample_every, late):
+        mean, F = mean_stress.MeanStress(steps, late), self.cells[ve]["F"]
+        for k in (0, *mean_stress.sampled_steps(steps, sample_every)):
+            mean.add(k, self._stress(ve, np.linalg.matrix_power(step, k) @ F))
+        return mean.mean()
+
+    def _stress(self, ve, F):
+        C = np.empty(81)
+        self.stiffness(ve, C)
+        strain = (F + F.T) / 2 - np.eye(3)
+        return (np.einsum("ijkl,kl->ij", C.reshape(3, 3, 3, 3), strain) - self.cells[ve]["confining_stress"] * np.eye(3)).ravel()
 
     def follow_network(self, ve):
         self.cells[ve]["time_step"] /= 2
@@ -127,11 +144,7 @@ class DummyEngine:
 
     def measure(self, ve, out_stress, out_report, out_stretch):
         cell = self.cells[ve]
-        C = np.empty(81)
-        self.stiffness(ve, C)
-        strain = (cell["F"] + cell["F"].T) / 2 - np.eye(3)
-        stress = np.einsum("ijkl,kl->ij", C.reshape(3, 3, 3, 3), strain) - cell["confining_stress"] * np.eye(3)
-        out_stress[:] = stress.ravel()
+        out_stress[:] = self._stress(ve, cell["F"])
         out_stretch[:] = cell["F"].ravel()
         values = {"dem_steps": cell["steps"], "time_step": cell["time_step"], "contacts": 1, "mean_rotation": np.nan}
         out_report[:] = [values.get(name, 0.0) for name in self.report_fields]

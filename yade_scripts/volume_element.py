@@ -16,6 +16,7 @@ import compact_scene
 import contact_laws
 import contact_loop
 import continuation
+import mean_stress
 import packing
 import probing
 import unit_of_time
@@ -30,6 +31,7 @@ DEFAULTS = {  # of what no case sets
     "script_seconds": 600.0,
     "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
 }
+END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
@@ -216,15 +218,18 @@ class Engine:
         self._select(ve)
         return self._geometry(self._grains[ve])
 
-    def deform(self, ve, velocity_gradient, steps):
+    def deform(self, ve, velocity_gradient, steps, sample_every=0, late=0.0, out_mean=None):
         self._select(ve)
         L = np.asarray(velocity_gradient, dtype=float).reshape(3, 3)
         started = time.perf_counter()
         self.O.cell.velGrad = self._Matrix3(*self._grains[ve].unit.scene_rate(L).ravel())
         before = time.perf_counter()
         try:
-            contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
-            self._to_forces()
+            if sample_every > 0:
+                self._run_sampled(steps, sample_every, late, out_mean, self._grains[ve].new_adhesion)
+            else:
+                contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
+                self._to_forces()
         except RuntimeError as error:
             if "larger than half of the cell" not in str(error):
                 raise
@@ -238,18 +243,33 @@ class Engine:
         trial.rate = float(np.linalg.norm(L + L.T)) / 2
         trial.since_look += steps
 
+    def _run_sampled(self, steps, every, late, out_mean, new_adhesion):
+        mean, made = mean_stress.MeanStress(steps, late), 0
+        mean.add(0, self._symmetric_stress())
+        for step in mean_stress.sampled_steps(steps, every):
+            contact_laws.run(self.O, step - made, new_adhesion)
+            self._to_forces()
+            mean.add(step, self._symmetric_stress())
+            made = step
+        out_mean[:] = mean.mean()
+
+    def _symmetric_stress(self):
+        s = self._love_weber()
+        return (0.5 * (s + s.T)).ravel()
+
     def measure(self, ve, out_stress, out_report, out_stretch):
         started = time.perf_counter()
         self._select(ve)
         trial, grains = self._trial[ve], self._grains[ve]
         s = self._love_weber()
-        out_stress[:] = (0.5 * (s + s.T)).ravel()
+        out_stress[:] = end = (0.5 * (s + s.T)).ravel()
         out_stretch[:] = np.array(self.O.cell.trsf).ravel()
         values = self._equilibrium(grains)
         values["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         values["time_step"] = grains.unit.seconds(self.O.dt)
         values["inertial_number"] = trial.rate * _time_scale(grains, -np.trace(s) / 3)
         values["stress_asymmetry"] = float(np.linalg.norm(s - s.T) / max(2 * np.linalg.norm(s), 1e-300))
+        values.update(zip(END_STRESS, end[[0, 4, 8, 1, 5, 6]]))
         values["dem_steps"], values["engine_seconds"] = trial.steps, trial.engine_seconds
         values["seconds"] = trial.seconds + time.perf_counter() - started
         out_report[:] = math.nan

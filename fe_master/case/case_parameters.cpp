@@ -167,6 +167,10 @@ Section<VeParameters> ve_section() {
        parameter("seed", &V::seed, "", kNotNegative, "of the preparation"),
        parameter("damping", &V::damping, "", {0.0, 0.95}, "local damping of YADE's integrator"),
        parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
+       word("answer", &V::answer, {"end", "mean"},
+            "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do"),
+       parameter("mean_at", &V::mean_at, "", {0.5, 2.0 / 3},
+                 "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
        parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
        parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
        parameter("freeze_steps", &V::freeze_steps, "", kAny,
@@ -362,10 +366,10 @@ const CaseSections& case_sections() {
                    .monitor = monitor_section(),
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
-    s.ve_region = region_of(
-        s.ve, &RegionVe::region, &RegionVe::ve,
-        {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot", "inertial_number",
-         "min_steps", "freeze_steps", "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
+    s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
+                            {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot",
+                             "inertial_number", "answer", "mean_at", "min_steps", "freeze_steps",
+                             "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
     return s;
   }();
   return sections;

@@ -17,7 +17,7 @@ namespace femxdem {
 /// What a material point reports beside its stress. One list: results files, shared memory and the Python side follow
 /// it.
 // clang-format off
-inline constexpr std::array<std::string_view, 20> kReportFields = {
+inline constexpr std::array<std::string_view, 26> kReportFields = {
     "dem_steps",          // DEM steps of this trial
     "seconds",            // wall time of this trial [s]
     "engine_seconds",     // of which inside the DEM engine's steps [s]
@@ -33,6 +33,8 @@ inline constexpr std::array<std::string_view, 20> kReportFields = {
     "stress_asymmetry",   // |skew sigma| / |sigma| before symmetrisation [-]
     "sliding_contacts",   // contacts at the Coulomb limit over all contacts [-]
     "contacts",           // number of contacts [-]
+    // Cauchy stress at the end of the trial, in the frame of the stretch U of F = R U [Pa]
+    "end_stress_xx", "end_stress_yy", "end_stress_zz", "end_stress_xy", "end_stress_yz", "end_stress_zx",
 };
 // clang-format on
 

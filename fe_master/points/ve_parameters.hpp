@@ -13,6 +13,7 @@ enum class NewContacts { frictional, adhesive };
 enum class Snapshot { fork, serialise };
 enum class VeStiffness { affine, relaxed };
 enum class EngineChoice { automatic, yade, compact };
+enum class VeAnswer { end, mean };
 enum class Assignment { same, random };
 struct VeParameters {
   VePreset preset = VePreset::none;  ///< gives spheres and inertial_number where the case does not
@@ -36,6 +37,8 @@ struct VeParameters {
   int seed = 1;                                   ///< of the preparation
   double damping = 0.2;                           ///< local damping of YADE's integrator [-]
   double inertial_number = 5e-3;                  ///< I = rate a sqrt(rho / p) of a trial [-]
+  VeAnswer answer = VeAnswer::end;                ///< which stress of a trial is its answer
+  double mean_at = 0.5;                           ///< where in the trial the mean belongs [-]
   double time_step_safety = 0.8;                  ///< DEM time step / critical one [-]
   int min_steps = 10;                             ///< least DEM steps of a trial that strains
   bool freeze_steps = true;                       ///< the DEM steps of a load step's trials are those of its first
@@ -53,5 +56,8 @@ struct VeParameters {
   int assignment_seed = 1;
   std::string cache;  ///< folder of prepared packings, absolute path; empty: the caller chooses
 };
+
+/// Where in a trial the stress that answers it belongs [-].
+inline double answer_at(const VeParameters& ve) { return ve.answer == VeAnswer::mean ? ve.mean_at : 1; }
 
 }  // namespace femxdem

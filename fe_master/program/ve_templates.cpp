@@ -159,6 +159,7 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   VolumeElementOptions options;
   options.inertial_number = ve.inertial_number;
   options.min_steps = ve.min_steps;
+  options.answer_at = answer_at(ve);
   options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
   options.relaxed = ve.stiffness == VeStiffness::relaxed;

@@ -46,6 +46,13 @@ std::vector<double> values(const Tensor2& F, const Response& response) {
   return row;
 }
 
+SolverParameters parameters_of(const Case& c) {
+  const bool on_volume_element = c.material.type == MaterialType::volume_element;
+  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_element);
+  if (on_volume_element) parameters.answer_at = answer_at(c.ve);
+  return parameters;
+}
+
 /// The steps along the segments and the files that they fill.
 class Path {
  public:
@@ -54,7 +61,7 @@ class Path {
 
  private:
   bool segment(std::size_t number);
-  bool step(double fraction, double time);
+  bool step(double fraction, double segments_before);
   void record_row();
 
   const Case& case_;
@@ -72,7 +79,7 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
     : case_(c),
       options_(options),
       noise_samples_(noise_samples),
-      parameters_(with_default_tolerances(c.solver, c.material.type == MaterialType::volume_element)),
+      parameters_(parameters_of(c)),
       driver_(point, parameters_),
       files_(c, options) {
   files_.begin_history(columns(noise_samples > 0));
@@ -115,7 +122,7 @@ bool Path::segment(std::size_t number) {
   driver_.begin_segment(case_.path[number]);
   while (!size.done(done)) {
     const double next = done + size.next(done);
-    if (step(next, static_cast<double>(number) + next)) {
+    if (step(next, static_cast<double>(number))) {
       done = next;
       size.accepted(true);
       continue;
@@ -128,7 +135,8 @@ bool Path::segment(std::size_t number) {
   return true;
 }
 
-bool Path::step(double fraction, double time) {
+/// A step to `fraction` of a segment; its row is of the moment that the answer belongs to.
+bool Path::step(double fraction, double segments_before) {
   last_ = driver_.solve(fraction);
   std::vector<IterationRecord> table;
   for (const PathIteration& i : last_.table) {
@@ -144,6 +152,7 @@ bool Path::step(double fraction, double time) {
   if (noise_samples_ > 0) last_noise_ = driver_.noise(parameters_.qn_noise, noise_samples_);
   largest_noise_ = std::max(largest_noise_, last_noise_);
   driver_.commit();
+  const double time = segments_before + driver_.fraction();
   record_.time = time;
   record_.load_factor = time / static_cast<double>(case_.path.size());
   record_.iterations = static_cast<int>(table.size());

@@ -60,13 +60,15 @@ Tensor2 from_path_components(const PathVector& v) {
 PathVector path_strain(const Tensor2& F) { return path_components(logarithmic_strain(F.transpose())); }
 
 PathDriver::PathDriver(MaterialPoints& point, const SolverParameters& parameters)
-    : point_(point), parameters_(parameters) {
+    : point_(point, parameters.answer_at), parameters_(parameters) {
   assert(point.size() == 1 && is_given(parameters.tolerance) && is_given(parameters.displacement_tolerance));
   begin_segment({});
   femxdem::commit(point_, {&response_, 1});
 }
 
 void PathDriver::begin_segment(const PathSegment& segment) {
+  F_ = F_end_;
+  point_.start_from(std::array{F_});
   point_.begin_step();
   response_ = point_.evaluate(std::array{F_}, Operator::elastic).front();
   if (response_.failure) throw UserError(describe(*response_.failure));
@@ -78,7 +80,7 @@ void PathDriver::begin_segment(const PathSegment& segment) {
   F_start_ = F_;
   E_start_ = path_strain(F_);
   stress_start_ = path_components(response_.stress);
-  fraction_ = last_fraction_ = 0;
+  fraction_ = last_fraction_ = end_ = 0;
 }
 
 bool PathDriver::stress_controlled(int component) const { return is_given(segment_.stress[component]); }
@@ -115,11 +117,11 @@ PathVector PathDriver::stress_target(double fraction) const {
 
 /// Start of the iterations: the last increment extrapolated, corrected for the carried residual, the change of the
 /// stress targets and the prescribed strains.
-PathVector PathDriver::predict(double fraction) const {
+PathVector PathDriver::predict(double fraction, double end) const {
   const double factor = last_fraction_ > 0 ? (fraction - fraction_) / last_fraction_ : 0;
   const PathVector E = path_strain(F_);
   PathVector guess = E + factor * last_E_change_;
-  PathVector given = strain_target(fraction) - guess;
+  PathVector given = point_.within<PathVector>(path_strain(F_end_), strain_target(end)) - guess;
   for (const int c : free_components()) given[c] = 0;
   const PathVector extrapolated = factor * (stress_target(fraction_) - stress_target(fraction_ - last_fraction_));
   const PathVector missing = stress_target(fraction) - extrapolated - path_components(response_.stress);
@@ -156,19 +158,23 @@ PathVector PathDriver::correction(const PathVector& E, const Tensor2& stress, co
   return change;
 }
 
-PathStep PathDriver::solve(double fraction) {
+PathStep PathDriver::solve(double end) {
   PathStep step;
+  const double fraction = point_.within(end_, end);
   const std::vector<int> free = free_components();
   const bool by_gradient = !segment_.deformation_gradient.empty();
   const PathVector committed = path_strain(F_), target = stress_target(fraction);
+  point_.start_from(std::array{F_end_});
   point_.begin_step();
   tangent_->begin_step(F_, response_.stress);
   trial_fraction_ = fraction;
-  PathVector E = by_gradient ? committed : predict(fraction);
+  trial_end_ = end;
+  PathVector E = by_gradient ? committed : predict(fraction, end);
   double least = std::numeric_limits<double>::infinity();
   while (static_cast<int>(step.table.size()) < parameters_.max_iterations) {
     PathIteration& now = step.table.emplace_back();
-    if (!evaluate(by_gradient ? prescribed_deformation(fraction) : deformation(E), step)) return step;
+    const Tensor2 F = by_gradient ? point_.within(F_end_, prescribed_deformation(end)) : deformation(E);
+    if (!evaluate(F, step)) return step;
     const PathVector missing = target - path_components(trial_.stress);
     const double scale = stress_scale(trial_.stress, from_path_components(stress_start_));
     for (const int c : free) now.residual = std::max(now.residual, std::abs(missing[c]) / scale);
@@ -231,6 +237,8 @@ void PathDriver::commit() {
   last_E_change_ = path_strain(trial_F_) - path_strain(F_);
   last_fraction_ = trial_fraction_ - fraction_;
   fraction_ = trial_fraction_;
+  end_ = trial_end_;
+  F_end_ = point_.end(F_end_, trial_F_);
   F_ = trial_F_;
   response_ = trial_;
 }

@@ -8,6 +8,7 @@
 #include "case.hpp"
 #include "learned_tangent.hpp"
 #include "material_points.hpp"
+#include "mid_step_points.hpp"
 
 namespace femxdem {
 
@@ -42,7 +43,9 @@ struct PathStep {
 /// Drives ONE material point along segments whose components are strain- or stress-controlled: the unknown strains
 /// follow from the stress targets by the quasi-Newton iterations of the boundary value problem (LearnedTangent over all
 /// six components; start from the last increment, corrected for the carried residual), every trial from the committed
-/// state through the seam. Strains are ln V with F = V R; R stays as a deformation gradient left it.
+/// state through the seam. Strains are ln V with F = V R; R stays as a deformation gradient left it. Where the point
+/// answers with the mean over its trial, a step's equations are those of the moment that it belongs to, as
+/// NonlinearSolver says.
 class PathDriver {
  public:
   /// point.size() is 1. Tolerances must be given, see with_default_tolerances.
@@ -51,16 +54,18 @@ class PathDriver {
 
   /// The committed state becomes the start of a segment, its tangent elastic.
   void begin_segment(const PathSegment& segment);
-  /// A trial at `fraction` of the segment (0 to 1), from the committed state. Nothing is committed.
-  PathStep solve(double fraction);
+  /// A trial to `end` of the segment (0 to 1), from the committed state. Nothing is committed.
+  PathStep solve(double end);
   /// Jitter of the stress of the converged trial: root mean square distance from a straight line of `samples` stresses
   /// at strains within +-amplitude along one random direction, over |sigma| [-]. The trial stays to be committed.
   double noise(double amplitude, int samples);
   /// Adopts the converged trial.
   void commit();
 
-  const Tensor2& F() const { return F_; }                 ///< committed
-  const Response& response() const { return response_; }  ///< committed
+  /// The last equilibrium: where the answer belongs in the last committed step, or the start of the segment.
+  const Tensor2& F() const { return F_; }
+  const Response& response() const { return response_; }
+  double fraction() const { return fraction_; }  ///< of the segment
 
  private:
   bool stress_controlled(int component) const;
@@ -70,7 +75,7 @@ class PathDriver {
   Tensor2 prescribed_deformation(double fraction) const;
   PathVector strain_target(double fraction) const;
   PathVector stress_target(double fraction) const;
-  PathVector predict(double fraction) const;
+  PathVector predict(double fraction, double end) const;
   /// d stress / d strain at a trial, from the learned dP/dF [Pa].
   Eigen::Matrix<double, 6, 6> stress_by_strain(const PathVector& E, const Tensor2& stress) const;
   /// Change of the free strains that answers the stress `missing` after a given change of the others.
@@ -78,7 +83,7 @@ class PathDriver {
                         const PathVector& given) const;
   bool evaluate(const Tensor2& F, PathStep& step);
 
-  MaterialPoints& point_;
+  MidStepPoints point_;
   SolverParameters parameters_;
   std::optional<LearnedTangent> tangent_;
   PathSegment segment_;
@@ -86,9 +91,11 @@ class PathDriver {
   Tensor2 F_start_ = Tensor2::Identity();          // of the segment
   PathVector E_start_, stress_start_;              // of the segment
   double fraction_ = 0, trial_fraction_ = 0;       // of the segment, committed and trial
+  double end_ = 0, trial_end_ = 0;                 // where the step ends
   double last_fraction_ = 0;                       // that the last committed step of this segment advanced
   PathVector last_E_change_ = PathVector::Zero();  // of that step
   Tensor2 F_ = Tensor2::Identity(), trial_F_ = Tensor2::Identity();
+  Tensor2 F_end_ = Tensor2::Identity();  // committed, of the end of the step
   Response response_, trial_;
 };
 

@@ -30,7 +30,9 @@ Problem::Start Problem::volume_elements() const {
 }
 
 NonlinearSolver& Problem::start(MaterialPoints& points) {
-  solver_.emplace(*formulation_, points, loads_, with_default_tolerances(case_.solver, on_volume_elements()));
+  SolverParameters parameters = with_default_tolerances(case_.solver, on_volume_elements());
+  if (on_volume_elements()) parameters.answer_at = answer_at(case_.ve);
+  solver_.emplace(*formulation_, points, loads_, parameters);
   return *solver_;
 }
 

@@ -76,7 +76,7 @@ int TimeLoop::go() {
   try {
     if (options_.existing != Existing::resume) write_fields();
     const int status = advance();
-    const double time = solver_.committed().time;
+    const double time = solver_.time();
     const std::string message = status == kDone
                                     ? fmt::format("{} steps to time {:g}", files_.summary.steps, time)
                                     : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
@@ -92,7 +92,7 @@ int TimeLoop::go() {
 
 int TimeLoop::advance() {
   int status = kDone;
-  while (status == kDone && !size_.done(solver_.committed().time)) {
+  while (status == kDone && !size_.done(solver_.time())) {
     step();
     if (!last_.converged && size_.exhausted()) status = last_.failure ? kPointFailed : kNotConverged;
   }
@@ -103,13 +103,13 @@ int TimeLoop::advance() {
 /// One attempt; on success everything about it is on the disk.
 void TimeLoop::step() {
   Equilibrium start = solver_.committed();
-  const double dt = size_.next(start.time);
-  last_ = solver_.solve_step(dt, control_.target(start, dt));
+  const double begin = solver_.time(), dt = size_.next(begin);
+  last_ = solver_.solve_step(dt, control_.target(start, solver_.span(dt)));
   const std::vector<IterationRecord> table = note_attempt(last_);
   if (last_.converged) {
     accept(std::move(start), table);
   } else {
-    reject(start.time + dt, table);
+    reject(begin + dt, table);
   }
 }
 
@@ -146,10 +146,10 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   if (control_.accepted(start, now))
     files_.log.say(fmt::format("limit point near: the load factor is now found by the {}", control_.description()));
   before_ = std::move(start);
-  const double done = now.time / case_.control.end_time;
+  const double done = solver_.time() / case_.control.end_time;
   record_.step = ++files_.summary.steps;
   record_.time = now.time;
-  record_.load_factor = case_.control.mode == ControlMode::time ? done : now.load_factor;
+  record_.load_factor = case_.control.mode == ControlMode::time ? now.time / case_.control.end_time : now.load_factor;
   record_.iterations = last_.iterations();
   record_.histories = points_.distinct();
   record_.residual = last_.table.back().residual;
@@ -180,8 +180,8 @@ void TimeLoop::write_fields() {
 }
 
 void TimeLoop::write_state() {
-  Checkpoint checkpoint{files_.summary.steps,     solver_.committed().time, size_.size(),          {}, {},
-                        files_.summary.case_hash, options_.versions,        comparable_toml(case_)};
+  Checkpoint checkpoint{files_.summary.steps,     solver_.time(),    size_.size(),          {}, {},
+                        files_.summary.case_hash, options_.versions, comparable_toml(case_)};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back(

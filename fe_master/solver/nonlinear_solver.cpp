@@ -68,12 +68,13 @@ std::string unmet(const StepResult& result) {
 NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& points, const Loads& loads,
                                  const SolverParameters& parameters)
     : formulation_(formulation),
-      points_(points),
+      points_(points, parameters.answer_at),
       loads_(loads),
       parameters_(parameters),
       prescribed_(loads.prescribed_dofs()),
       assembler_(formulation, prescribed_),
       committed_(undeformed(formulation, points, loads)),
+      start_(committed_.x),
       last_{0, Eigen::VectorXd::Zero(formulation.unknowns()), Eigen::VectorXd::Zero(formulation.multipliers()),
             Eigen::VectorXd::Zero(formulation.unknowns()), 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
@@ -128,21 +129,25 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
 
 void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
   points_.begin_step();
+  points_.start_from(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_));
   operators_.begin_step(committed_.F, committed_.responses);
   factorised_in_step_ = false;
-  trial.time = committed_.time + dt;
+  trial.time = trial_time(dt);
   predict(trial, dt);
-  const bool reaches_start = committed_.time <= parameters_.start_time && trial.time > parameters_.start_time;
+  const bool reaches_start = time_ <= parameters_.start_time && time_ + dt > parameters_.start_time;
   if (parameters_.start_amplitude > 0 && reaches_start) start_at_random(trial);
 }
+
+double NonlinearSolver::trial_time(double dt) const { return points_.within(time_, time_ + dt); }
 
 /// Start of the iterations: the last step's increment extrapolated, corrected for the carried residual, the change of
 /// the loads and the prescribed values; an elastic predictor where there is no last increment.
 void NonlinearSolver::predict(Equilibrium& trial, double dt) {
-  const double factor = parameters_.predictor == Predictor::extrapolate && last_.dt > 0 ? dt / last_.dt : 0;
+  const double factor = parameters_.predictor == Predictor::extrapolate && last_.dt > 0 ? span(dt) / last_.dt : 0;
   trial.x += factor * last_.x;
   trial.multipliers += factor * last_.multipliers;
-  const Eigen::VectorXd target = loads_.prescribed(committed_.time, trial.time);
+  const Eigen::VectorXd target =
+      points_.within<Eigen::VectorXd>(start_(prescribed_), loads_.prescribed(time_, time_ + dt));
   Eigen::VectorXd change = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (std::size_t i = 0; i < prescribed_.size(); ++i) {
     change[prescribed_[i]] = target[static_cast<Eigen::Index>(i)] - trial.x[prescribed_[i]];
@@ -344,17 +349,22 @@ void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistor
 
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   femxdem::commit(points_, trial.responses);
-  last_ = {dt, trial.x - committed_.x, trial.multipliers - committed_.multipliers, trial.external - committed_.external,
-           trial.load_factor - committed_.load_factor};
+  last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
+           trial.external - committed_.external, trial.load_factor - committed_.load_factor};
   committed_ = std::move(trial);
-  formulation_.commit(committed_.x);
+  const Eigen::VectorXd end = points_.end(start_, committed_.x);
+  time_ += dt;
+  start_ = end;
+  formulation_.commit(start_);
+  committed_.x += start_ - end;  // unknowns that are increments of a step are counted from the new start
 }
 
 void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);
   operators_.save(arrays);
   arrays.emplace_back("solver.time",
-                      std::vector<double>{committed_.time, last_.dt, committed_.load_factor, last_.load_factor});
+                      std::vector<double>{committed_.time, last_.dt, committed_.load_factor, last_.load_factor, time_});
+  add(arrays, "solver.x", committed_.x);
   add(arrays, "solver.multipliers", committed_.multipliers);
   add(arrays, "solver.last_change", last_.x);
   add(arrays, "solver.last_multiplier_change", last_.multipliers);
@@ -375,7 +385,9 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   const auto& time = find_array(arrays, "solver.time");
   committed_.time = time.at(0);
   committed_.load_factor = time.at(2);
-  committed_.x = formulation_.start();
+  time_ = time.at(4);
+  start_ = formulation_.start();
+  committed_.x = find_vector(arrays, "solver.x");
   committed_.multipliers = find_vector(arrays, "solver.multipliers");
   last_ = {time.at(1), find_vector(arrays, "solver.last_change"), find_vector(arrays, "solver.last_multiplier_change"),
            find_vector(arrays, "solver.last_external_change"), time.at(3)};

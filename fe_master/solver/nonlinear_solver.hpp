@@ -12,6 +12,7 @@
 #include "linear_solver.hpp"
 #include "loads.hpp"
 #include "material_points.hpp"
+#include "mid_step_points.hpp"
 #include "point_operators.hpp"
 #include "solver_parameters.hpp"
 
@@ -43,7 +44,7 @@ struct StepResult {
   int iterations() const { return static_cast<int>(table.size()); }
 };
 
-/// A state in equilibrium.
+/// A state in equilibrium, of one moment.
 struct Equilibrium {
   double time = 0;              ///< [s]
   Eigen::VectorXd x;            ///< unknowns (Formulation)
@@ -61,6 +62,11 @@ struct Equilibrium {
 ///
 /// Every trial strains the points from their committed state by the step's total increment; a step that fails leaves
 /// no trace, and the trial that satisfied equilibrium is the state that is committed.
+///
+/// Where the points answer with the mean over their trials (SolverParameters::answer_at = theta < 1), forces balance at
+/// t_n + theta dt: the unknowns of a step are those of that moment, loads are taken there, and what is committed is
+/// x_n + (x - x_n) / theta. Prescribed values are met at the end. Second order in dt (README of
+/// validation/quasi_static).
 class NonlinearSolver {
  public:
   /// Evaluates the undeformed state, whose stiffness C_1111 (of the first point) gives the penalty of the constraints
@@ -72,7 +78,12 @@ class NonlinearSolver {
   /// factor of the released loads is an unknown and the measure's value the equation for it.
   StepResult solve_step(double dt, const std::optional<MeasureTarget>& target = {});
 
+  /// The last equilibrium found, at theta of the last step: that which curves and fields show.
   const Equilibrium& committed() const { return committed_; }
+  /// The end of the last step [s]: committed().time for theta = 1.
+  double time() const { return time_; }
+  /// From the committed equilibrium to that of a step dt [s]: dt for theta = 1.
+  double span(double dt) const { return points_.theta() == 1 ? dt : trial_time(dt) - committed_.time; }
   const PointOperators& operators() const { return operators_; }
   /// Out-of-balance force of a state over its reactions and external forces [-].
   double relative_residual(const Equilibrium& state) const;
@@ -84,6 +95,7 @@ class NonlinearSolver {
   void load(const NamedArrays& arrays);
 
  private:
+  double trial_time(double dt) const;
   void begin_step(Equilibrium& trial, double dt);
   void predict(Equilibrium& trial, double dt);
   void start_at_random(Equilibrium& trial) const;
@@ -108,7 +120,7 @@ class NonlinearSolver {
   std::vector<double> of_elements(const Eigen::VectorXd& residual) const;
 
   Formulation& formulation_;
-  MaterialPoints& points_;
+  MidStepPoints points_;
   const Loads& loads_;
   SolverParameters parameters_;
   std::vector<int> prescribed_;
@@ -116,7 +128,9 @@ class NonlinearSolver {
   LinearSolver linear_solver_;
   bool factorised_in_step_ = false;
   Equilibrium committed_;
-  struct Increment {  // of the last committed step
+  double time_ = 0;        // of the end of the last step
+  Eigen::VectorXd start_;  // unknowns there
+  struct Increment {       // between the last two equilibria
     double dt = 0;
     Eigen::VectorXd x, multipliers, external;
     double load_factor = 0;

@@ -30,6 +30,7 @@ struct SolverParameters {
   double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;       ///< of the step that goes beyond this time [s]
   int start_seed = 1;
+  double answer_at = 1;  ///< fraction of a trial that the points' stress belongs to; not of the case: answer_at(ve) [-]
   double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
 };
 

@@ -94,6 +94,42 @@ TEST(PythonVolumeElements, ElasticStressOfTheDummyCell) {
   EXPECT_EQ(response.report["dem_steps"], 20);
 }
 
+VolumeElementOptions mean_at(double theta) {
+  VolumeElementOptions options;
+  options.answer_at = theta;
+  return options;
+}
+
+/// The stress of the dummy cell is linear in the stretch: the mean over a trial is that of the stretch at answer_at, to
+/// second order in the strain, turned by the rotation of the end; a trial of no step answers with the stress of its
+/// end.
+TEST(PythonVolumeElements, MeanStressOfTheDummyCell) {
+  Tensor2 U = Tensor2::Identity(), Q;
+  U(0, 0) = 1.001;
+  Q << 0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1;
+  for (const double theta : {0.5, 0.6, 0.6666}) {
+    Points one({kPlain}, dummy(), mean_at(theta));
+    Response response = one.points.evaluate(std::vector{Tensor2(Q * U)}, Operator::none)[0];
+    ASSERT_FALSE(response.failure) << response.failure->sentence;
+    const Tensor2 s = Q.transpose() * response.stress * Q;
+    EXPECT_NEAR(s(0, 0), theta * 1.2e5 - 1e5, 1.2e8 * 1e-6 / 4);
+    EXPECT_NEAR(s(1, 1), theta * 4e4 - 1e5, 4e7 * 1e-6 / 4);
+    one.points.commit();
+    response = one.points.evaluate(std::vector{U}, Operator::none)[0];
+    EXPECT_EQ(response.report["dem_steps"], 0);
+    EXPECT_NEAR(response.stress(0, 0), 1.2e5 - 1e5, 1e-4);
+  }
+}
+
+TEST(PythonVolumeElements, MeanStressHasTheSameBitsAfterASaveAndALoad) {
+  Points whole(kThree, dummy(), mean_at(0.5)), other(kThree, dummy(), mean_at(0.5));
+  const auto F = gradients(3, 1e-3);
+  contract::trial(whole.points, part(F, 0.5));
+  whole.points.commit();
+  other.points.load(whole.points.save());
+  expect_same_bits(contract::trial(whole.points, F), contract::trial(other.points, F));
+}
+
 /// The dummy's mean rotation stands for what costs too much to be reported by every trial: |F - I| of its cell.
 TEST(PythonVolumeElements, ReportsAreCompleteOnceTheyAreCommitted) {
   for (const VolumeElementOptions& options : {VolumeElementOptions{}, serialised()}) {

@@ -214,6 +214,25 @@ class Reports(unittest.TestCase):
         np.testing.assert_allclose(every_third, coarse, rtol=0, atol=1e-13 * np.abs(mean).max())
         self.assertTrue(np.isnan(c.copy().deform(L, 7)).all())
 
+    def test_mean_stress_of_both_engines_to_the_bit_and_of_a_split(self):
+        for name in ("friction", "adhesive"):
+            ve, c = sorted_element(SPECS[name]), cell(name)
+            L, halves = next(rates(c)), c.copy()
+            for every, late in ((1, 0.0), (7, 0.0), (1, 0.98)):
+                theirs = np.full(9, np.nan)
+                engine().deform(ve, L, 100, every, late, theirs)
+                mine = c.deform(L, 100, sample_every=every, late=late)
+                np.testing.assert_array_equal(mine.ravel(), theirs)
+                stress = np.empty(9)
+                engine().measure(ve, stress, np.empty(len(engine().report_fields)), np.empty(9))
+                np.testing.assert_array_equal(c.stress().ravel(), stress)  # taking stresses moves nothing
+                self.assertGreater(np.abs(mine - c.stress()).max(), 1e-4 * np.abs(mine).max())
+            whole = halves.copy().deform(L, 100, sample_every=1)
+            first, second = halves.deform(L, 40, sample_every=1), halves.deform(L, 60, sample_every=1)
+            np.testing.assert_allclose(0.4 * first + 0.6 * second, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
+            at_rest = c.deform(L, 0, sample_every=1)
+            np.testing.assert_array_equal(at_rest, c.stress())
+
     def test_the_time_step_follows_the_network(self):
         ve = sorted_element(SPECS["adhesive"])
         O = select(ve)

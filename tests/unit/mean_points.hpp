@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cassert>
+
+#include "analytic_points.hpp"
+
+namespace femxdem {
+
+/// Laws in closed form that answer as volume elements with ve.answer = "mean" do: with the mean of the stress over the
+/// way from the committed F to the trial's, taken in the frame of the material and turned to that of the end. Weight 1
+/// + late (2 t / T - 1), late = 6 theta - 3.
+class MeanPoints : public MaterialPoints {
+ public:
+  MeanPoints(std::vector<AnalyticLaw> laws, double theta)
+      : laws_(std::move(laws)), late_((6 * theta - 3) / (1 + 2.0 / (kParts * kParts))) {
+    for (const AnalyticLaw& law : laws_) committed_.push_back(initial_state(law));
+    trial_ = committed_;
+  }
+
+  std::size_t size() const override { return laws_.size(); }
+  std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override {
+    std::vector<Response> responses;
+    for (std::size_t p = 0; p < size(); ++p) responses.push_back(answer(p, F[p], wanted));
+    return responses;
+  }
+  void commit() override { committed_ = trial_; }
+  SavedStates save() override { return {}; }
+  void load(const SavedStates&) override {}
+
+  const LawState& committed(std::size_t point) const { return committed_[point]; }
+  void set_committed(const MeanPoints& other) { committed_ = trial_ = other.committed_; }
+
+ private:
+  static constexpr int kParts = 16;
+
+  Response answer(std::size_t p, const Tensor2& F, Operator wanted) {
+    const Tensor2 start = committed_[p].F;
+    Tensor2 sum = 0.5 / kParts * (1 - late_) * unrotated(committed_[p]);
+    LawState state = committed_[p];
+    Response response;
+    for (int k = 1; k <= kParts; ++k) {
+      const LawState before = state;
+      const double done = static_cast<double>(k) / kParts;
+      response = update(laws_[p], before, Tensor2(start + done * (F - start)), wanted, state);
+      if (response.failure) return response;
+      sum += (k == kParts ? 0.5 : 1.0) / kParts * (1 + late_ * (2 * done - 1)) * unrotated(state);
+    }
+    trial_[p] = state;
+    response.stress = rotate(sum, polar_decomposition(F).R);
+    return response;
+  }
+  static Tensor2 unrotated(const LawState& state) {
+    return rotate(state.stress, Tensor2(polar_decomposition(state.F).R.transpose()));
+  }
+
+  std::vector<AnalyticLaw> laws_;
+  double late_;
+  std::vector<LawState> committed_, trial_;
+};
+
+}  // namespace femxdem
