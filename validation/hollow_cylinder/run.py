@@ -27,7 +27,7 @@ from spirals import spirals_of_run
 PAPER = {
     "952": Row("952.toml", text="28 x 34 Q8: Fig. 6a"),
     "870": Row("870.toml", text="29 x 30 second gradient: Fig. 6b"),
-    "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=15),
+    "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=0)  # memory: README.md,
 }
 UNIQUENESS = {
     f"start_{n}": Row("870.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign import ENVIRONMENT, CampaignError, Run
-from results import read_history
+from campaign import ENVIRONMENT, CampaignError
 
 CLOCKS = ("dem_seconds", "wall_s")  # columns that hold times of the machine
 
