@@ -71,7 +71,7 @@ std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F,
   if (size() == 0) return responses;
   std::vector<Straining> plans;
   for (std::size_t i = 0; i < size(); ++i) {
-    plans.push_back(plan(i, quantised(F[i])));
+    plans.push_back(plan(i, F[i]));
     worker_.slot(i).task = plans[i].refusal ? Task::skip : Task::deform;
     responses[i].failure = plans[i].refusal;
   }
