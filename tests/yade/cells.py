@@ -10,7 +10,8 @@ from volume_element import Engine
 FIELDS = (
     "dem_steps seconds engine_seconds unbalanced_force inertial_number time_step porosity coordination "
     "coordination_backbone fabric_xx fabric_yy fabric_zz fabric_xy fabric_yz fabric_zx mean_rotation "
-    "adhesive_contacts stress_asymmetry sliding_contacts contacts"
+    "adhesive_contacts stress_asymmetry sliding_contacts contacts "
+    "end_stress_xx end_stress_yy end_stress_zz end_stress_xy end_stress_yz end_stress_zx"
 ).split()
 SPHERES = 60
 PACKING = {

@@ -162,7 +162,7 @@ class States(unittest.TestCase):
                 self.assertEqual(differences(c.to_scene(), compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
 
     def test_a_state_does_not_fit_a_scene_of_other_spheres(self):
-        ve = element(packing(contact_law="friction"))
+        ve = element(packing(spheres=60, contact_law="friction"))
         with self.assertRaisesRegex(RuntimeError, "100 spheres does not fit"):
             compact_scene.write_back(select(ve), exported("friction"))
 
@@ -214,18 +214,19 @@ class Reports(unittest.TestCase):
         np.testing.assert_allclose(every_third, coarse, rtol=0, atol=1e-13 * np.abs(mean).max())
         self.assertTrue(np.isnan(c.copy().deform(L, 7)).all())
 
-    def test_mean_stress_of_both_engines_to_the_bit_and_of_a_split(self):
+    def test_mean_stress_of_both_engines_and_of_a_split(self):
         for name in ("friction", "adhesive"):
             ve, c = sorted_element(SPECS[name]), cell(name)
-            L, halves = next(rates(c)), c.copy()
+            L, halves, plain = next(rates(c)), c.copy(), c.copy()
             for every, late in ((1, 0.0), (7, 0.0), (1, 0.98)):
                 theirs = np.full(9, np.nan)
                 engine().deform(ve, L, 100, every, late, theirs)
                 mine = c.deform(L, 100, sample_every=every, late=late)
-                np.testing.assert_array_equal(mine.ravel(), theirs)
-                stress = np.empty(9)
-                engine().measure(ve, stress, np.empty(len(engine().report_fields)), np.empty(9))
-                np.testing.assert_array_equal(c.stress().ravel(), stress)  # taking stresses moves nothing
+                # YADE's getStress sums over the contacts in an order of its own: to round-off
+                np.testing.assert_allclose(mine.ravel(), theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+                plain.deform(L, 100)
+                self.assertEqual(plain.save(), c.save())  # taking stresses moves nothing
+                self.assertEqual(differences(c.to_scene(), compact_scene.export(select(ve))), [])
                 self.assertGreater(np.abs(mine - c.stress()).max(), 1e-4 * np.abs(mine).max())
             whole = halves.copy().deform(L, 100, sample_every=1)
             first, second = halves.deform(L, 40, sample_every=1), halves.deform(L, 60, sample_every=1)
