@@ -78,6 +78,8 @@ std::string comparable_toml(const Case& c);
 
 /// Reference of all parameters, by section: key, type, unit, default, bounds, text.
 std::string describe_parameters();
+/// The same as Markdown, one table a section.
+std::string parameters_markdown();
 
 /// Identifies what a case computes: 16 hexadecimal digits, independent of [output], paths and comments; files that the
 /// case names (mesh, script, scene) count by their contents.

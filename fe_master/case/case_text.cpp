@@ -100,6 +100,45 @@ void describe(std::string& out, const Section<S>& section, bool array) {
   out += "\n";
 }
 
+/// For a cell of a table in Markdown.
+std::string cell_text(const std::string& text) {
+  std::string out;
+  for (const char character : text) {
+    if (character == '|' || character == '*') out += '\\';
+    out += character;
+  }
+  return out.empty() ? "-" : out;
+}
+
+template <class S>
+void describe_as_row(std::string& out, const Parameter<S>& p) {
+  std::string allowed = cell_text(bounds_text(p.bounds));
+  if (p.kind == Kind::word) {
+    allowed.clear();
+    for (const std::string& word : p.words)
+      if (!word.empty()) allowed += fmt::format("{}`{}`", allowed.empty() ? "" : ", ", word);
+  }
+  const std::string value = default_text(p);
+  out += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", p.key, kind_name(p.kind, p.size), cell_text(p.unit),
+                     value == "-" ? value : "`" + value + "`", allowed, cell_text(p.text));
+}
+
+template <class S>
+void describe_as_table(std::string& out, const Section<S>& section, bool array) {
+  const bool region = section.name.ends_with(".region");
+  const std::string name = array ? "[[" + section.name + "]]" : "[" + section.name + "]";
+  out += fmt::format("\n## `{}`\n{}.\n\n| key | type | unit | default | allowed | |\n|---|---|---|---|---|---|\n", name,
+                     cell_text(section.text));
+  std::string others;
+  for (const Parameter<S>& p : section.parameters) {
+    if (!region || p.key == "region")
+      describe_as_row(out, p);
+    else
+      others += fmt::format("{}`{}`", others.empty() ? "" : ", ", p.key);
+  }
+  if (region) out += "\nand any of: " + others + "\n";
+}
+
 /// The packing's files by their contents, where they are cached not at all.
 void forget_places(VeParameters& ve) {
   ve.script = hash_text(read_file(ve.script));
@@ -158,6 +197,19 @@ std::string describe_parameters() {
   const Case defaults;
   for_each_section(defaults, [&out]<class S, class V>(const Section<S>& section, const V&) {
     describe(out, section, !std::is_same_v<S, V>);
+  });
+  return out;
+}
+
+std::string parameters_markdown() {
+  std::string out =
+      "# Parameters of a case\n\nMade by `femxdem parameters --markdown`; a test holds it to the program. `[name]` is "
+      "a "
+      "table that stands once in a case file, `[[name]]` one that may stand several times. Default `-`: none; what a "
+      "case needs and does not give, `femxdem check` says.\n";
+  const Case defaults;
+  for_each_section(defaults, [&out]<class S, class V>(const Section<S>& section, const V&) {
+    describe_as_table(out, section, !std::is_same_v<S, V>);
   });
   return out;
 }

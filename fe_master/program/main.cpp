@@ -37,6 +37,7 @@ struct Arguments {
   bool overwrite = false;
   int noise_samples = 0;
   int compare = 0;
+  bool markdown = false;
   std::string command_line;
 };
 
@@ -207,6 +208,7 @@ int main(int argc, char** argv) {
   CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
   add_case(check_command);
   CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
+  parameters_command->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
 
   CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect");
   ve_command->require_subcommand(1);
@@ -238,7 +240,7 @@ int main(int argc, char** argv) {
     if (*path_command) return ve_path(ve_arguments(arguments));
     if (*prepare_command) return ve_prepare(ve_arguments(arguments));
     if (*inspect_command) return ve_inspect(ve_arguments(arguments));
-    if (*parameters_command) std::cout << describe_parameters();
+    if (*parameters_command) std::cout << (arguments.markdown ? parameters_markdown() : describe_parameters());
     if (app.get_subcommands().empty()) std::cout << app.help();
     return kDone;
   } catch (const CLI::ParseError& error) {
