@@ -26,7 +26,7 @@ EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std
 /// The worker of a rank for these volume elements.
 WorkerCommand worker_command(const VeParameters& ve);
 
-/// The volume elements of this rank. trials: how many the run expects of it, for the sample that YADE repeats;
+/// The volume elements of this rank. trials: how many the run expects of all ranks, for the sample that YADE repeats;
 /// evidence: where the data of a trial go that it answers otherwise; ranks: on this machine, which share its
 /// processors.
 std::unique_ptr<LocalPoints> make_local_points(EngineKind engine, WorkerProcess& worker, const VeParameters& ve,

@@ -114,7 +114,7 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
   WorkerProcess worker(worker_command(ve));
   const Mpi mpi;
   const auto local_points = [&](EngineKind engine) {
-    return make_local_points(engine, worker, ve, expected_trials(problem) / mpi.size, options.folder, mpi.of_machine);
+    return make_local_points(engine, worker, ve, expected_trials(problem), options.folder, mpi.of_machine);
   };
   if (mpi.rank > 0) {
     const auto engine = mpi.agreed();
