@@ -141,6 +141,13 @@ def export(O):
     return MAGIC + b"".join(np.ascontiguousarray(p).tobytes() for p in parts)
 
 
+def cell(O):
+    """The compact cell of a covered scene: it sums in the order of the spheres' numbers, YADE in that of its container."""
+    import compact_cell
+
+    return compact_cell.CompactCell.from_scene(export(O))
+
+
 def _numbers(O, law, safety):
     newton, cell, physics, unit = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0], unit_of_time.of(O).in_a_second
     L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator
