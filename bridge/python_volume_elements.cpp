@@ -149,6 +149,7 @@ void PythonVolumeElements::commit() {
   try {
     reply = request();
   } catch (const UserError&) {  // the trial died while it waited: the inputs are still there
+    options_.say("a trial ended before it was committed; it is repeated");
     for (std::size_t i = 0; i < size(); ++i) worker_.slot(i).task = Task::deform;
     std::vector<Response> responses(size());
     run_trial(with_stiffness_, responses);

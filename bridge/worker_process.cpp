@@ -156,7 +156,7 @@ Reply WorkerProcess::request(Command command, std::int64_t a, std::int64_t b, st
   wait_until_ready();
   const std::uint32_t number = send(command, a, b, mail);
   const Reply reply =
-      receive(number, command == Command::make_template ? command_.template_timeout : command_.point_timeout);
+      receive(number, command, command == Command::make_template ? command_.template_timeout : command_.point_timeout);
   if (reply.kind == ReplyKind::error) throw UserError(this->mail(reply));
   return reply;
 }
@@ -175,7 +175,7 @@ std::optional<std::size_t> WorkerProcess::in_flight() const {
 
 void WorkerProcess::wait_until_ready() {
   if (ready_) return;
-  const Reply reply = receive(0, command_.point_timeout);
+  const Reply reply = receive(0, Command::versions, command_.point_timeout);
   if (reply.kind == ReplyKind::error) throw UserError(mail(reply));
   ready_ = true;
 }
@@ -189,7 +189,7 @@ std::uint32_t WorkerProcess::send(Command command, std::int64_t a, std::int64_t 
   return sent_;
 }
 
-Reply WorkerProcess::receive(std::uint32_t number, double timeout) {
+Reply WorkerProcess::receive(std::uint32_t number, Command command, double timeout) {
   auto progress = Clock::now();
   std::int64_t seen = batch_->in_flight;
   for (;;) {
@@ -212,6 +212,9 @@ Reply WorkerProcess::receive(std::uint32_t number, double timeout) {
                       "restart from the last checkpoint",
                       pid_));
     if (reply.number == number) return reply;
+    // the trial may have taken the commit from the socket and died before it answered: nobody will
+    if (command == Command::commit && reply.kind == ReplyKind::child_died)
+      throw UserError(fmt::format("the trial ended with {} while it was committed", describe_wait_status(reply.value)));
   }
 }
 

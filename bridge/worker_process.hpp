@@ -67,7 +67,7 @@ class WorkerProcess {
   void start();
   void wait_until_ready();
   std::uint32_t send(Command command, std::int64_t a, std::int64_t b, std::string_view mail);
-  Reply receive(std::uint32_t number, double timeout);
+  Reply receive(std::uint32_t number, Command command, double timeout);
   void reap();
   void end();
 
