@@ -190,6 +190,11 @@ def draw_profiles(runs, names, file):
 
 def report(c):
     runs = existing(c, RUNS)
+    restart = bits_of_restart(c, "restart")
+    said = restart_line(restart, "small.toml to 3 %, killed after step 12, gone on from step 10") if restart else ""
+    if restart and not runs:
+        print(said)
+        return 1 if restart[1] else 0
     if not runs:
         raise campaign.CampaignError(f"{c.runs}: no row has results; run one first")
     c.processor_seconds = sum(run.processor_seconds for run in runs.values())
@@ -206,9 +211,8 @@ def report(c):
     if asked := [name for name in SENSITIVITY if name in specimens]:
         draw_curves(runs, [name for name in ("128", *asked) if name in runs], c.product("sensitivity.png"))
     lines = HEADER + [table_row(name, run) for name, run in runs.items() if name != "ve_friction"] + claims(runs)
-    restart = bits_of_restart(c, "restart")
     if restart:
-        lines += ["", restart_line(restart, "small.toml to 3 %, killed after step 12, gone on from step 10")]
+        lines += ["", said]
     c.table(lines)
     print(*lines, sep="\n")
     return 1 if restart and restart[1] else 0

@@ -156,6 +156,11 @@ def draw_maps(runs, names, file, reach=3.5):
 
 def report(c):
     runs = existing(c, RUNS)
+    restart = bits_of_restart(c, "restart")
+    said = restart_line(restart, "small.toml, killed after step 12, gone on from step 10") if restart else ""
+    if restart and not runs:
+        print(said)
+        return 1 if restart[1] else 0
     if not runs:
         raise campaign.CampaignError(f"{c.runs}: no row has results; run one first")
     c.processor_seconds = sum(run.processor_seconds for run in runs.values())
@@ -174,9 +179,8 @@ def report(c):
         phi, cohesion, psi = strength(*cell.values())
         lines += ["", f"The volume element alone: phi = {phi:.1f}, psi = {psi:.1f} degrees, c = {cohesion:.2f} sigma_0; bands between 45 - phi / 2 and "
                   f"45 - psi / 2 to the radius: {45 - phi / 2:.1f} to {45 - psi / 2:.1f} degrees."]
-    restart = bits_of_restart(c, "restart")
     if restart:
-        lines += ["", restart_line(restart, "small.toml, killed after step 12, gone on from step 10")]
+        lines += ["", said]
     c.table(lines)
     print(*lines, sep="\n")
     return 1 if restart and restart[1] else 0
