@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "edge_samples.hpp"
+#include "edge_length.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "mesh_gaps.hpp"
@@ -19,12 +19,6 @@ namespace femxdem {
 namespace {
 
 std::string data(const std::string& name) { return std::string(TEST_CASES) + "/mesh/" + name; }
-
-double length_of(const Mesh& mesh, const std::string& edge) {
-  double length = 0;
-  for (const EdgeSample& g : edge_samples(mesh, edge)) length += g.weight * g.tangent.norm();
-  return length;
-}
 
 double area(const Mesh& mesh) {
   double sum = 0.0;
@@ -67,14 +61,14 @@ TEST(MeshFiles, AnElementOrSideIsOneInAllItsGroups) {
   EXPECT_NEAR(area(mesh), 1.0, 1e-12);
   EXPECT_EQ(mesh.regions.at("soil").size(), 8u);
   EXPECT_EQ(mesh.regions.at("weak").size(), 4u);
-  EXPECT_NEAR(length_of(mesh, "right"), 1.0, 1e-12);
-  EXPECT_NEAR(length_of(mesh, "upper_right"), 0.5, 1e-12);
+  EXPECT_NEAR(edge_length(mesh, "right"), 1.0, 1e-12);
+  EXPECT_NEAR(edge_length(mesh, "upper_right"), 0.5, 1e-12);
 }
 
 TEST(MeshFiles, TwoGroupsOfOneNameAreOne) {
   const Mesh mesh = gmsh_mesh(data("one_name_of_two_groups.msh"));
   EXPECT_EQ(mesh.regions.at("soil").size(), 8u);
-  for (const char* edge : {"bottom", "right", "top", "left"}) EXPECT_NEAR(length_of(mesh, edge), 1.0, 1e-12) << edge;
+  for (const char* edge : {"bottom", "right", "top", "left"}) EXPECT_NEAR(edge_length(mesh, edge), 1.0, 1e-12) << edge;
 }
 
 TEST(MeshFiles, ZOfRoundOffIsZeroAndMoreIsNot) {
@@ -150,8 +144,8 @@ TEST(MeshFiles, GroupsOverlapInEveryFormatOfGmsh) {
       EXPECT_NEAR(area(mesh), 1.0, 1e-12);
       for (const char* region : {"soil", "all"}) EXPECT_EQ(mesh.regions.at(region), (std::vector<int>{0, 1, 2, 3}));
       for (const char* edge : {"bottom", "right", "top", "left"})
-        EXPECT_NEAR(length_of(mesh, edge), 1.0, 1e-12) << edge;
-      EXPECT_NEAR(length_of(mesh, "top_and_left"), 2.0, 1e-12);
+        EXPECT_NEAR(edge_length(mesh, edge), 1.0, 1e-12) << edge;
+      EXPECT_NEAR(edge_length(mesh, "top_and_left"), 2.0, 1e-12);
     }
   }
 }
@@ -178,7 +172,7 @@ TEST(MeshFiles, GroupsOfFormat2AreThoseOfItsElements) {
   const Mesh mesh = gmsh_mesh(file);
   EXPECT_EQ(mesh.regions.at("soil").size(), 4u);
   EXPECT_EQ(mesh.regions.at("rock").size(), 4u);
-  for (const char* edge : {"bottom", "right", "top", "left"}) EXPECT_NEAR(length_of(mesh, edge), 1.0, 1e-12) << edge;
+  for (const char* edge : {"bottom", "right", "top", "left"}) EXPECT_NEAR(edge_length(mesh, edge), 1.0, 1e-12) << edge;
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-#include "edge_samples.hpp"
+#include "edge_length.hpp"
 #include "errors.hpp"
 #include "reference_element.hpp"
 
@@ -74,12 +74,6 @@ std::vector<std::string> edge_names(const Mesh& mesh) {
   return names;
 }
 
-double length(const Mesh& mesh, const std::string& edge) {
-  double sum = 0;
-  for (const EdgeSample& g : edge_samples(mesh, edge)) sum += g.weight * g.tangent.norm();
-  return sum;
-}
-
 TEST(RectangleMesh, CountsAreaAndEdges) {
   const Mesh mesh = rectangle_mesh(1.5, 2.0, 3, 5);
   EXPECT_EQ(mesh.elements.size(), 15u);
@@ -89,8 +83,8 @@ TEST(RectangleMesh, CountsAreaAndEdges) {
   EXPECT_EQ(edge_names(mesh), (std::vector<std::string>{"bottom", "left", "right", "top"}));
   EXPECT_EQ(mesh.edges.at("top").size(), 3u);
   EXPECT_EQ(mesh.edges.at("left").size(), 5u);
-  EXPECT_NEAR(length(mesh, "top"), 1.5, 1e-15);
-  EXPECT_NEAR(length(mesh, "right"), 2.0, 1e-15);
+  EXPECT_NEAR(edge_length(mesh, "top"), 1.5, 1e-15);
+  EXPECT_NEAR(edge_length(mesh, "right"), 2.0, 1e-15);
   for (const std::string& name : edge_names(mesh)) expect_oriented_chain(mesh, name);
   for (const Side& side : mesh.edges.at("right")) EXPECT_EQ(mesh.nodes[side.nodes[1]].x(), 1.5);
   for (const Side& side : mesh.edges.at("bottom")) EXPECT_EQ(mesh.nodes[side.nodes[1]].y(), 0.0);
@@ -112,7 +106,9 @@ TEST(AnnulusMesh, QuarterHasItsEdgesOnTheAxes) {
 
 TEST(AnnulusMesh, AreaAndArcsConvergeAtOrderFour) {
   const auto error = [](int nt) { return std::abs(area(annulus_mesh(1.0, 3.0, 90.0, 2, nt)) - 2.0 * kPi); };
-  const auto arc = [](int nt) { return std::abs(length(annulus_mesh(1.0, 3.0, 90.0, 2, nt), "outer") - 1.5 * kPi); };
+  const auto arc = [](int nt) {
+    return std::abs(edge_length(annulus_mesh(1.0, 3.0, 90.0, 2, nt), "outer") - 1.5 * kPi);
+  };
   EXPECT_NEAR(std::log2(error(4) / error(8)), 4.0, 0.1);
   EXPECT_NEAR(std::log2(arc(4) / arc(8)), 4.0, 0.1);
   EXPECT_LT(error(8), 1e-4);
@@ -182,7 +178,7 @@ TEST(GmshMesh, GeometryIsMeshedWithItsNames) {
   for (const std::string& name : edge_names(mesh)) {
     expect_oriented_chain(mesh, name);
     EXPECT_EQ(mesh.edges.at(name).size(), 2u);
-    EXPECT_NEAR(length(mesh, name), 1.0, 1e-15);
+    EXPECT_NEAR(edge_length(mesh, name), 1.0, 1e-15);
   }
   check_mesh(mesh);
 }
@@ -225,7 +221,7 @@ TEST(GmshMesh, ClockwiseSurfacesAreTurnedAndEdgesChainAcrossCurves) {
   EXPECT_NEAR(area(mesh), 2.0, 1e-13);
   EXPECT_NEAR(twice_area_by_edges(mesh), 4.0, 1e-13);
   for (const std::string& name : edge_names(mesh)) expect_oriented_chain(mesh, name);
-  EXPECT_NEAR(length(mesh, "bottom"), 2.0, 1e-14);
+  EXPECT_NEAR(edge_length(mesh, "bottom"), 2.0, 1e-14);
   std::set<int> all;
   for (const char* region : {"clay", "sand"})
     all.insert(mesh.regions.at(region).begin(), mesh.regions.at(region).end());
