@@ -24,11 +24,12 @@ struct SolverParameters {
   double noise = 0.0;    ///< relative jitter of the stress of a volume element, measured; 0: not known [-]
   double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
   double qn_max = 1.2;
-  double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
-  double qn_first = kNotGiven;   ///< weight of what a step's first trial teaches against the committed state [-]
-  double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
-  double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
-  double start_time = 0.0;       ///< of the step that goes beyond this time [s]
+  double qn_skew = 0.6;           ///< bound of its skew part, elastic metric [-]
+  double qn_first = kNotGiven;    ///< weight of what a step's first trial teaches against the committed state [-]
+  double qn_scatter = kNotGiven;  ///< of a pair's stress about what its strain explains, over it [-]
+  double qn_noise = 1e-6;         ///< strain change below which nothing is learned [-]
+  double start_amplitude = 0.0;   ///< seeded random start of one step / its displacement [-]
+  double start_time = 0.0;        ///< of the step that goes beyond this time [s]
   int start_seed = 1;
   double answer_at = 1;  ///< fraction of a trial that the points' stress belongs to; not of the case: answer_at(ve) [-]
   double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
