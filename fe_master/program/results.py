@@ -4,6 +4,7 @@ Stresses are Cauchy, tension positive, as in the files; curves are compression p
 """
 
 import csv
+import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,12 @@ import numpy as np
 
 class ResultsError(Exception):
     """What is missing in a folder, where, and what to do: one sentence."""
+
+
+def end_with(tool, error):
+    """Ends a subcommand of the program on bad input."""
+    print(f"femxdem {tool}: {error}", file=sys.stderr)
+    sys.exit(2)
 
 
 def read_columns(file):
