@@ -204,9 +204,11 @@ int main(int argc, char** argv) {
     command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
   };
   const auto add_progress = [&](CLI::App* command) {
-    command->add_flag("--progress,!--no-progress", arguments.progress,
-                      "One line that updates, or a line for each step (default: the first on terminals, but not under "
-                      "mpirun or a scheduler)");
+    command->add_flag_callback(
+        "--progress", [&] { arguments.progress = true; },
+        "One line that updates (default on terminals, but not under mpirun or a scheduler)");
+    command->add_flag_callback(
+        "--no-progress", [&] { arguments.progress = false; }, "A line for each step");
   };
   CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
   add_case(run_command);

@@ -114,8 +114,12 @@ class Environments(unittest.TestCase):
         environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "SLURM_"))}
         subprocess.run(command, cwd=FOLDER, stdout=theirs, timeout=100, env={**environment, "TERM": "xterm", **env}, check=True)
         os.close(theirs)
-        said = os.read(ours, 100000)
-        os.close(ours)
+        said = b""
+        try:
+            while more := os.read(ours, 100000):
+                said += more
+        except OSError:  # nobody writes to it any more
+            os.close(ours)
         return said
 
     def test_progress_is_one_line_on_a_terminal_of_a_person_or_where_asked(self):
