@@ -56,10 +56,12 @@ def is_path(history):
 
 
 def point_curves(folder):
-    """Stress components of a single point over the component of strain that it was driven along farthest."""
+    """Stress components of a single point over that component of strain, of those that its path prescribes, which went
+    farthest."""
     case, history = read_case(folder), read_history(folder)
     components = ("xx", "yy", "zz", "xy", "yz", "zx")
-    driven = max(components, key=lambda c: np.ptp(history[f"strain_{c}"]))
+    prescribed = [c for c in components if any(f"strain_{c}" in segment for segment in case.get("path", []))]
+    driven = max(prescribed or components, key=lambda c: np.ptp(history[f"strain_{c}"]))
     sigma_0 = confining_stress(case)
     names = {"of": "stress", "against": f"strain {driven} [%] (logarithmic, compression positive)"}
     names["unit"] = r"/ $\sigma_0$" if sigma_0 else "[Pa]"
@@ -169,15 +171,23 @@ def maps_html(data):
             f'<label><input id="fixed" type="checkbox"> same colours in all steps</label></p>{figures}')
 
 
+def is_cylinder(case, curve):
+    return case.get("mesh", {}).get("type") == "annulus" or curve.of.startswith("pressure")
+
+
+def spiral_text(s):
+    thickness = (f"thickness {s.thickness:.3g} m (scatter {s.thickness_scatter:.2g} over {s.stations} profiles)"
+                 if s.stations else "no profile across it has two sides")
+    return (f"From the wall at {s.start:.0f} degrees: {s.inclination:+.1f} degrees to the radius, reaches {s.reach:.2f} wall "
+            f"radii, {thickness}.")
+
+
 def band_text(folder, of_wall):
     """The measured bands as sentences, those of a wall from its sector of the case's angle, or why there is none."""
     try:
         if of_wall:
             angle = read_case(folder).get("mesh", {}).get("angle", 90.0)
-            return "<br>".join(
-                f"From the wall at {s.start:.0f} degrees: {s.inclination:+.1f} degrees to the radius, reaches {s.reach:.2f} wall radii, "
-                f"thickness {s.thickness:.3g} m (scatter {s.thickness_scatter:.2g} over {s.stations} profiles)."
-                for s in spirals_of_run(folder, angle=angle))
+            return "<br>".join(map(spiral_text, spirals_of_run(folder, angle=angle)))
         b = band_of_run(folder)
         return (f"Thickness {b.thickness:.4g} m (scatter {b.thickness_scatter:.2g} over {b.stations} profiles), full width at half "
                 f"height, inclination {b.inclination:.1f} degrees from the lateral axis, peak of the strain {b.peak:.3g}: last output step.")
@@ -214,7 +224,7 @@ def page(folder, ve_folder=None):
             f" · {summary['date']} on {summary['host']}" if summary else ""),
         "curve_title": escape(f"{curves[0].of.capitalize()}" + (f", over that of {ve_folder}" if ve_folder else "")),
         "curve": curve_svg(curves), "convergence": cost_svg(history), "maps": maps_html(data),
-        "band": band_text(folder, curves[0].of.startswith("pressure")) if data["steps"] else "No band in a single point.",
+        "band": band_text(folder, is_cylinder(case, curves[0])) if data["steps"] else "No band in a single point.",
         "engine": engine_html(folder, summary), "versions": table(summary.get("versions", {}).items()),
         "case_text": escape((folder / "case.toml").read_text()), "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip

@@ -90,9 +90,9 @@ class Page(unittest.TestCase):
     def test_a_single_point_is_drawn_over_the_strain_that_drives_it(self):
         folder = Path(self.temporary.name) / "point"
         folder.mkdir()
-        folder.joinpath("case.toml").write_text("[ve]\nconfining_stress = 1e5\n")
+        folder.joinpath("case.toml").write_text("[ve]\nconfining_stress = 1e5\n[[path]]\nstrain_yy = -0.02\nstress_xx = -1e5\n")
         names = [f"{q}_{c}" for q in ("strain", "stress") for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
-        rows = "".join(f"{k},{k},1,1,1e-3,0.0,{-0.01 * k},0,0,0,0,-1e5,{-1e5 - 1e5 * k},-1.5e5,0,0,0\n" for k in range(3))
+        rows = "".join(f"{k},{k},1,1,1e-3,{0.03 * k},{-0.01 * k},0,0,0,0,-1e5,{-1e5 - 1e5 * k},-1.5e5,0,0,0\n" for k in range(3))
         folder.joinpath("history.csv").write_text("step,time,load_factor,evaluations,residual," + ",".join(names) + "\n" + rows)
         curves = report.point_curves(folder)
         self.assertEqual([c.label for c in curves], ["stress xx", "stress yy", "stress zz"])
@@ -101,6 +101,11 @@ class Page(unittest.TestCase):
         self.assertIn("Single volume element", report.page(folder))
         run = report.curves_of(self.folder, folder)
         self.assertEqual((len(run[0]), run[1]), (2, folder))
+
+    def test_an_annulus_is_asked_for_spirals(self):
+        self.assertTrue(report.is_cylinder({"mesh": {"type": "annulus"}}, report.run_curve(self.folder)))
+        self.assertFalse(report.is_cylinder(report.read_case(self.folder), report.run_curve(self.folder)))
+        self.assertIn("Not measured: no band starts at the wall", report.band_text(self.folder, True))
 
     def test_a_folder_without_a_run_is_one_sentence_and_status_2(self):
         with self.assertRaises(ResultsError):
