@@ -278,6 +278,9 @@ Section<SolverParameters> solver_section() {
            "of a pair's stress about what its strain explains, over it; 0: every pair is met exactly; default 0.1 "
            "for volume elements, else 0"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
+       parameter("reuse_below", &S::reuse_below, "", {0.0, 1.0},
+                 "a point that has moved by less of the step's strain since its last trial answers from its learned "
+                 "tangent; 0: none"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
                  "random start of one step / its displacement: finds other solutions"),
        parameter("start_time", &S::start_time, "s", kNotNegative, "the random start is that of the step past this"),

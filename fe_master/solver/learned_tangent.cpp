@@ -144,16 +144,27 @@ MandelVector LearnedTangent::unrotated(const Tensor2& stress, const Tensor2& R) 
   return to_mandel(Tensor2(R.transpose() * stress * R), components_);
 }
 
-void LearnedTangent::learn(const Tensor2& F, const Tensor2& stress) {
+Misfit LearnedTangent::learn(const Tensor2& F, const Tensor2& stress) {
   const auto [R, U] = polar_decomposition(F);
   const MandelVector s = strain(U) - strain_;
   const MandelVector y = unrotated(stress, R) - stress_;
-  if (s.norm() < limits_.noise) return;
+  if (s.norm() < limits_.noise) return {};
   strain_ += s;
   stress_ += y;
-  C_ += (y - C_ * s) * gain(s).transpose();
+  const MandelVector expected = C_ * s, missed = y - expected;
+  const Misfit misfit = first_ ? Misfit{} : Misfit{missed.squaredNorm(), expected.squaredNorm()};
+  C_ += missed * gain(s).transpose();
   first_ = false;
   bound();
+  return misfit;
+}
+
+Tensor2 LearnedTangent::predict(const Tensor2& F, const Tensor2& from, const Tensor2& stress) const {
+  const auto [R, U] = polar_decomposition(F);
+  const auto [R_from, U_from] = polar_decomposition(from);
+  const Tensor2 e = (U - U_from) * U_n_.inverse();
+  const Tensor2 change = unflat(from_mandel(C_, components_) * flat(0.5 * (e + e.transpose())));
+  return R * (R_from.transpose() * stress * R_from + change) * R.transpose();
 }
 
 MandelVector LearnedTangent::gain(const MandelVector& strain_change) {

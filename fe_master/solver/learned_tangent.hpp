@@ -36,6 +36,11 @@ struct LearningLimits {
   double noise = 1e-6;  ///< change of strain below which nothing is learned [-]
 };
 
+/// How far a learned tangent was off before it learned: squares of the misfit y - C s and of the expected C s [Pa^2].
+struct Misfit {
+  double missed = 0, expected = 0;
+};
+
 /// Finite-difference probes of one point: changes of strain and of stress, one column a component.
 struct StrainProbe {
   double size = 0;
@@ -61,8 +66,10 @@ class LearnedTangent {
 
   /// Start of a step from the committed F and stress.
   void begin_step(const Tensor2& F, const Tensor2& stress);
-  /// Response of a trial of this step.
-  void learn(const Tensor2& F, const Tensor2& stress);
+  /// Response of a trial of this step. Its misfit; 0 of a step's first trial and where nothing is learned.
+  Misfit learn(const Tensor2& F, const Tensor2& stress);
+  /// Stress at F, by the tangent, where it was `stress` at `from` [Pa].
+  Tensor2 predict(const Tensor2& F, const Tensor2& from, const Tensor2& stress) const;
   /// Probes about a trial: start, one F for each component, its answer, and the tangent from all answers (no bounds).
   StrainProbe start_probe(const Tensor2& F, const Tensor2& stress, double size) const;
   Tensor2 probe(const StrainProbe& probe, const Tensor2& F, int component) const;

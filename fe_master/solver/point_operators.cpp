@@ -51,13 +51,19 @@ void PointOperators::begin_step(std::span<const Tensor2> F, std::span<const Resp
   }
 }
 
-void PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+Misfit PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+  Misfit sum;
   for (std::size_t p = 0; p < responses.size(); ++p) {
-    if (parameters_.global_operator == GlobalOperator::quasi_newton) learned_[p].learn(F[p], responses[p].stress);
+    if (parameters_.global_operator == GlobalOperator::quasi_newton) {
+      const Misfit misfit = learned_[p].learn(F[p], responses[p].stress);
+      sum.missed += misfit.missed;
+      sum.expected += misfit.expected;
+    }
     if (symmetric() && parameters_.refresh == Refresh::iteration) {
       elastic_[p] = parameters_.operator_scale * responses[p].stiffness;
     }
   }
+  return sum;
 }
 
 int PointOperators::probe(MaterialPoints& points, std::span<const Tensor2> F, std::span<const Response> responses) {

@@ -28,6 +28,7 @@ struct SolverParameters {
   double qn_first = kNotGiven;    ///< weight of what a step's first trial teaches against the committed state [-]
   double qn_scatter = kNotGiven;  ///< of a pair's stress about what its strain explains, over it [-]
   double qn_noise = 1e-6;         ///< strain change below which nothing is learned [-]
+  double reuse_below = 0.0;       ///< a point that moved by less of its step's strain answers from its tangent [-]
   double start_amplitude = 0.0;   ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;        ///< of the step that goes beyond this time [s]
   int start_seed = 1;
