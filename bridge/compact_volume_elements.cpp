@@ -295,8 +295,8 @@ void CompactVolumeElements::load(const SavedStates& states) {
   for (std::size_t p = 0; p < size(); ++p) {
     auto entry = known.find(states[p]);
     if (entry == known.end()) entry = known.emplace(states[p], point_of(states[p])).first;
+    require_origin(entry->second.strained.origin, points_[p].strained.origin);
     loaded.push_back(entry->second);
-    loaded.back().strained.origin = points_[p].strained.origin;
   }
   points_ = std::move(loaded);
   trials_.clear();

@@ -22,7 +22,9 @@ PointOperators::PointOperators(const SolverParameters& parameters, std::span<con
       components_(static_cast<int>(components.size())),
       F_n_(reference.size(), Tensor2::Identity()) {
   const double first = is_given(parameters.qn_first) ? parameters.qn_first : 1;
-  const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, first, parameters.qn_noise};
+  const double scatter = is_given(parameters.qn_scatter) ? parameters.qn_scatter : 0;
+  const LearningLimits limits{parameters.qn_min, parameters.qn_max,  parameters.qn_skew, first,
+                              scatter,           parameters.qn_noise};
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
     elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));
