@@ -92,7 +92,7 @@ def main():
     exporting = time.thread_time() - exporting
     committed = compact_cell.CompactCell.from_scene(start)
     times = costs(engine, ve, start, L)
-    print(f"{len(committed)} spheres, {committed.contacts} contacts, {arguments.law}, I = {arguments.inertial_number:g}")
+    print(f"{len(committed)} spheres, {committed.report()['contacts']:.0f} contacts, {arguments.law}, I = {arguments.inertial_number:g}")
     print("            a step [us]: min, median; n steps [ms], min / median, n = " + ", ".join(map(str, STEPS)))
     print(line("YADE", times["YADE"], {n: np.array(times["YADE"]) * n / BLOCK for n in STEPS}))
     for kernel in compact_cell.kernels():
