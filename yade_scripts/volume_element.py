@@ -94,6 +94,7 @@ class Engine:
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
             self._to_forces()
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
