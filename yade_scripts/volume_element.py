@@ -91,6 +91,7 @@ class Engine:
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
             contact_laws.to_forces(self.O)
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
