@@ -157,7 +157,7 @@ def measured(spheres, law, inertial_number, state=None):
     both = lambda values: (float(min(values)), float(np.median(values)))
     return {
         "spheres": len(committed),
-        "contacts": committed.contacts,
+        "contacts": int(committed.report()["contacts"]),
         "step_us": {name: both(1e6 * np.array(t) / BLOCK) for name, t in times.items()},
         "trial_ms": {name: {n: both(1e3 * np.array(t)) for n, t in of.items()} for name, of in trials.items()},
         "memory_mb": {"YADE": of_yade, "a trial of YADE": of_trial, "compact": of_compact},
