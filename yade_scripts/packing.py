@@ -20,14 +20,14 @@ MAX_STEPS = 400_000
 
 def prepare(O, spec):
     """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest. `spec` is the whole [ve]
-    table of a case: `femxdem parameters` has its units, and the only defaults.
+    table of a case, which has checked it: `femxdem parameters` has its units, bounds, and the only defaults.
 
     Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii
     are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
     The paper's law comes to rest in a compact cell at the end: the scene holds its places, contacts and forces.
-    Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
+    Raises RuntimeError when equilibrium is not reached.
     """
-    p = _checked(dict(spec))
+    p = dict(spec)
     unit = unit_of_time.suited(p["confining_stress"], p["density"], p["spheres"])
     unit_of_time.note(O, unit)
     p["density"] = unit.scene_density(p["density"])  # all times and rates of the scene follow from it
@@ -65,29 +65,11 @@ def prepare(O, spec):
     O.interactions.serializeSorted = True  # contacts come back from a saved scene in the order of the spheres
 
 
-def _checked(p):
-    laws = (*contact_laws.LAWS, contact_laws.PAPER)
-    if p["contact_law"] not in laws:
-        known = ", ".join(laws)
-        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {known}.")
-    if p["cohesion"] > 0 and p["contact_law"] == "friction":
-        raise ValueError("ve.cohesion > 0 needs a ve.contact_law other than \"friction\", which has none.")
-    if p["new_contacts"] not in contact_laws.NEW_CONTACTS:
-        known = ", ".join(contact_laws.NEW_CONTACTS)
-        raise ValueError(f"ve.new_contacts = \"{p['new_contacts']}\" is unknown: use one of {known}.")
-    adhesion = p["contact_law"] in ("adhesive", contact_laws.PAPER) and p["cohesion"] > 0
-    if p["new_contacts"] == "adhesive" and not adhesion:
-        raise ValueError('ve.new_contacts = "adhesive" needs ve.contact_law = "adhesive" or "paper", and ve.cohesion > 0.')
-    if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
-        raise ValueError("ve needs spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0.")
-    return p
-
-
 def _settle_papers_law(O, p, kn, f_c):
     """Brings the packing to rest at sigma_0 under the paper's law, in a compact cell without dashpots; contacts that form
     meanwhile become adhesive. Leaves the scene inside a step, after its contact forces."""
     contact_laws.note_paper_law(O, 0.0)
-    _to_forces(O)
+    contact_laws.to_forces(O)
     servo = _CompactServo(O, p, kn)
     while True:
         servo.settle()
@@ -96,13 +78,6 @@ def _settle_papers_law(O, p, kn, f_c):
             break
         servo.take_over()
     contact_laws.note_paper_law(O, p["viscous_damping"])
-
-
-def _to_forces(O):
-    O.subStepping = True
-    for _ in O.engines:
-        O.step()
-    O.subStepping = False
 
 
 def _loose_cell(O, p, kn, side, positions, radii):
