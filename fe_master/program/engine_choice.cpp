@@ -59,6 +59,23 @@ EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std
           fmt::format("engine: compact cells; every template equals YADE's to the bit over {} steps", kSteps)};
 }
 
+PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vector<VeParameters> pool,
+                        RunOptions& options) {
+  PythonVolumeElements maker(worker, ve_options(ve));
+  options.lock = prepare_output_folder(options.folder, options.existing);
+  for (VeParameters& setup : pool) setup.cache = writable_cache(setup, options.folder);
+  PreparedRun prepared;
+  prepared.states = make_templates(maker, pool, [&](std::string_view line) {
+    std::cout << line << std::endl;
+    options.remarks.emplace_back(line);
+  });
+  options.versions.merge(engine_versions(maker));
+  const EngineVerdict verdict = choose_engine(ve.engine, worker, prepared.states);
+  options.remarks.push_back(verdict.sentence);
+  prepared.engine = verdict.engine;
+  return prepared;
+}
+
 WorkerCommand worker_command(const VeParameters& ve) {
   WorkerCommand command;
   command.sorted_contacts = ve.sorted_contacts;

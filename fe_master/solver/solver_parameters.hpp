@@ -25,7 +25,7 @@ struct SolverParameters {
   double qn_min = 0.02;  ///< bounds of the symmetric part of the learned tangent, elastic metric [-]
   double qn_max = 1.2;
   double qn_skew = 0.6;          ///< bound of its skew part, elastic metric [-]
-  double qn_first = kNotGiven;   ///< weight of what a step's first trial teaches against the committed state [-]
+  double qn_first = kNotGiven;   ///< weight of what a step's first trial teaches (LearningLimits::first) [-]
   double qn_noise = 1e-6;        ///< strain change below which nothing is learned [-]
   double start_amplitude = 0.0;  ///< seeded random start of one step / its displacement [-]
   double start_time = 0.0;       ///< of the step that goes beyond this time [s]
@@ -33,5 +33,13 @@ struct SolverParameters {
   double answer_at = 1;  ///< fraction of a trial that the points' stress belongs to; not of the case: answer_at(ve) [-]
   double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
 };
+
+/// With tolerances where none are given: 5e-3 (force) and 0.1 (displacement) for volume elements, whose noise allows no
+/// less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
+inline SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements) {
+  if (!is_given(parameters.tolerance)) parameters.tolerance = volume_elements ? 5e-3 : 1e-8;
+  if (!is_given(parameters.displacement_tolerance)) parameters.displacement_tolerance = volume_elements ? 0.1 : 1e-6;
+  return parameters;
+}
 
 }  // namespace femxdem
