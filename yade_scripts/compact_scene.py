@@ -148,6 +148,21 @@ def cell(O):
     return compact_cell.CompactCell.from_scene(export(O))
 
 
+def stress(O):
+    """(3, 3) Cauchy stress [Pa] of a covered scene, symmetric, with the bits of compact cells (love_weber of
+    bridge/compact_report.cpp): the same operations, contacts in the order of the spheres' numbers."""
+    contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
+    phys, x = [i.phys for i in contacts], _vectors([b.state for b in O.bodies], "pos")
+    i, j = (_scalars(contacts, name).astype(int) for name in ("id1", "id2"))
+    H, shift = np.array(O.cell.hSize).reshape(3, 3), np.array([list(c.cellDist) for c in contacts], float).reshape(-1, 3)
+    images = H[:, 0] * shift[:, :1] + (H[:, 1] * shift[:, 1:2] + H[:, 2] * shift[:, 2:])
+    force, branch = _vectors(phys, "normalForce") + _vectors(phys, "shearForce"), (x[i] - x[j]) - images
+    s = np.zeros((3, 3))
+    if contacts:  # cumsum adds one after the other
+        s = np.cumsum(force[:, :, None] * branch[:, None, :], axis=0)[-1] / O.cell.volume
+    return 0.5 * (s + s.T)
+
+
 def _numbers(O, law, safety):
     newton, cell, physics, unit = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0], unit_of_time.of(O).in_a_second
     L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator

@@ -156,17 +156,20 @@ def _noted(O, tag):
 
 
 def run(O, steps, new_adhesion):
-    """`steps` DEM steps. With new_adhesion = (f_c, friction), the contacts that have formed since the last look become
-    adhesive at every step number divisible by EVERY: by the scene's own count (steps_made), so that no split and no
-    restart moves it."""
-    step = O.step
+    """`steps` DEM steps. Before the cell moves, one that has become long flips, by YADE's own Cell.flipCell (its
+    flipFlippable flips after the move, and not in a step that is made part by part). With new_adhesion = (f_c, friction),
+    the contacts that have formed since the last look become adhesive at every step number divisible by EVERY: by the
+    scene's own count (steps_made), so that no split and no restart moves it."""
+    step, flip = O.step, O.cell.flipCell
     if not new_adhesion:
         for _ in range(steps):
             step()
+            flip()
         return
     added, last = looks_for_new_contacts(O)
     for _ in range(steps):
         step()
+        flip()
         if (O.iter - added) % EVERY == 0:
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
             last = O.iter

@@ -16,6 +16,7 @@ import compact_scene
 import contact_laws
 import contact_loop
 import continuation
+import forces_at_rest
 import mean_stress
 import packing
 import probing
@@ -56,6 +57,7 @@ class _Grains:
     clumped: bool
     states: list  # YADE's objects with positions and rotations
     new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
+    in_order: bool  # sums run over the contacts as in compact cells
 
 
 class Engine:
@@ -122,7 +124,7 @@ class Engine:
             adopted = archive_check.state(self.O)
             archive_check.refuse_not_finite(self.O, f"after {steps} steps of a small strain")
             before = self._at_rest() if viscosity.noted(self.O) > 0 else adopted
-            self.replace(ve, self.save(ve))
+            self.replace(ve, self.O.sceneToString())  # without its forces: what they are found to be tells what was dropped
             archive_check.refuse_dropped(before, archive_check.state(self.O), self.O, f"after {steps} steps of a small strain")
         except Exception:
             itself.dismiss()
@@ -171,12 +173,14 @@ class Engine:
         O = self.O
         O.stringToScene(state)
         O.forces.reset(False)  # resetting permanent forces as well crashes YADE where bodies have been erased
+        kept = forces_at_rest.Kept(O)
         without = contact_laws.sliding_without_normal_force(O.interactions)
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         contact_laws.note_restored(O)
         contact_laws.to_forces(self.O)
-        contact_laws.take_normal_force(O.forces, without)
+        if not kept.put_back(O):
+            contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
         if os.environ.get("FEMXDEM_SORTED_CONTACTS"):
             contact_laws.loop_in_order(O)
@@ -184,7 +188,7 @@ class Engine:
 
     def save(self, ve):
         self._select(ve)
-        return self.O.sceneToString()
+        return forces_at_rest.saved(self.O)
 
     def export_scene(self, state):
         ve = self.add(state)
@@ -308,20 +312,26 @@ class Engine:
 
     def follow_network(self, ve):
         self._select(ve)
-        follow_network(self.O)
+        if not self._sums_in_order():
+            follow_network(self.O)
+            return
+        cell = compact_scene.cell(self.O)
+        cell.follow_network()
+        self.O.dt = cell.info()["time_step"] * self._grains[ve].unit.in_a_second
 
     def _select(self, ve):
         if self.O.thisScene != ve:
             self.O.switchToScene(ve)
 
     def _sums_in_order(self):
-        """Whether answers are to have the bits of compact cells."""
-        return os.environ.get("FEMXDEM_SORTED_CONTACTS") and not compact_scene.covered(self.O)
+        """Whether the answers of the current scene are to have the bits of compact cells."""
+        grains = self._grains.get(self.O.thisScene)
+        return grains is not None and grains.in_order
 
     def _love_weber(self):
         """Stress (3, 3) [Pa], tension positive, slightly asymmetric."""
         if self._sums_in_order():
-            return np.array(compact_scene.cell(self.O).stress()).reshape(3, 3)
+            return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
 
     def _scales(self, grains):
@@ -367,7 +377,8 @@ def _grains(O):
     states = [b.state for b in O.bodies]
     new_adhesion = contact_laws.adhesion_of_new_contacts(O)
     diameter = 2 * float(radius[radius > 0].mean())
-    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion)
+    in_order = bool(os.environ.get("FEMXDEM_SORTED_CONTACTS")) and not compact_scene.covered(O)
+    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion, in_order)
 
 
 def _mean_rotation(states):

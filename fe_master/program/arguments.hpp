@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct Arguments {
   std::vector<std::string> overrides;  ///< section.key=value
   bool restart = false;
   bool overwrite = false;
+  std::optional<bool> progress;  ///< RunOptions::progress
   int noise_samples = 0;  ///< ve path: probes of the stress's jitter in each step
   int compare = 0;        ///< ve prepare: DEM steps beside the scene's own continuation in YADE
   bool markdown = false;

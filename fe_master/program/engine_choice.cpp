@@ -62,7 +62,6 @@ EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std
 PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vector<VeParameters> pool,
                         RunOptions& options) {
   PythonVolumeElements maker(worker, ve_options(ve));
-  options.lock = prepare_output_folder(options.folder, options.existing);
   for (VeParameters& setup : pool) setup.cache = writable_cache(setup, options.folder);
   PreparedRun prepared;
   prepared.states = make_templates(maker, pool, [&](std::string_view line) {

@@ -13,7 +13,9 @@
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
+#include "output_folder.hpp"
 #include "time_loop.hpp"
+#include "tools.hpp"
 #include "ve_commands.hpp"
 #include "versions.hpp"
 #include "volume_elements.hpp"
@@ -86,6 +88,7 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
   const VePool pool = problem.volume_elements();
   PreparedRun prepared;
   try {
+    options.lock = prepare_output_folder(options.folder, options.existing);
     prepared = prepare_run(worker, ve, pool.templates, options);
   } catch (...) {
     mpi.agree(std::nullopt);
@@ -154,6 +157,14 @@ CLI::App* add_case_command(CommandLine& line, CLI::App& parent, const char* name
   return added;
 }
 
+void add_progress(CLI::App& command, Arguments& arguments) {
+  command.add_flag_callback(
+      "--progress", [&arguments] { arguments.progress = true; },
+      "One line that updates (default on terminals, but not under mpirun or a scheduler)");
+  command.add_flag_callback(
+      "--no-progress", [&arguments] { arguments.progress = false; }, "A line for each step");
+}
+
 void add_commands(CommandLine& line) {
   line.app.require_subcommand(0, 1);
   line.app.add_flag_callback(
@@ -168,6 +179,7 @@ void add_commands(CommandLine& line) {
   run_it->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
   run_it->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
   run_it->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(*run_it, arguments);
   add_case_command(line, line.app, "check", "Say all mistakes of a case file, without running it", check);
   add_command(line, line.app, "parameters", "Every parameter: unit, default, bounds, text", parameters)
       ->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
@@ -175,11 +187,12 @@ void add_commands(CommandLine& line) {
 
 void add_ve_commands(CommandLine& line) {
   Arguments& arguments = line.arguments;
-  CLI::App& ve = *line.app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect");
+  CLI::App& ve = *line.app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect, serve");
   ve.require_subcommand(1);
   CLI::App* path = add_case_command(line, ve, "path", "Follow the [[path]] of a case with one material point", ve_path);
   path->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
   path->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(*path, arguments);
   path->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
       ->check(CLI::Range(3, 1000));
   CLI::App* prepare = add_case_command(line, ve, "prepare", "Make the volume elements of a case", ve_prepare);
@@ -192,6 +205,9 @@ void add_ve_commands(CommandLine& line) {
       ->check(CLI::Range(1, 1000000));
   add_case_command(line, ve, "inspect", "Draw a volume element: of a case, or a prepared .state", ve_inspect)
       ->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
+  add_case_command(line, ve, "serve",
+                   "Answer one strain a line of the standard input, for scripts: femxdem.py (the module femxdem)",
+                   ve_serve);
 }
 
 }  // namespace
@@ -206,7 +222,9 @@ int main(int argc, char** argv) {
   for (int i = 0; i < argc; ++i) line.arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
   add_commands(line);
   add_ve_commands(line);
+  for (const Tool& tool : tools()) line.app.add_subcommand(std::string(tool.name), std::string(tool.help));
   try {
+    if (const Tool* tool = argc > 1 ? find_tool(argv[1]) : nullptr) become(*tool, {argv + 2, argv + argc});
     line.app.parse(argc, argv);
     if (line.app.get_subcommands().empty()) std::cout << line.app.help();
     return line.status;

@@ -4,6 +4,7 @@ Stresses are Cauchy, tension positive, as in the files; curves are compression p
 """
 
 import csv
+import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,12 @@ def _there(file):
     if not Path(file).exists():
         raise ResultsError(f"{file}: not there; give the folder that `femxdem run` wrote")
     return Path(file)
+
+
+def end_with(tool, error):
+    """Ends a subcommand of the program on bad input."""
+    print(f"femxdem {tool}: {error}", file=sys.stderr)
+    sys.exit(2)
 
 
 def read_columns(file):

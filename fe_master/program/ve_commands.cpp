@@ -1,16 +1,18 @@
 #include "ve_commands.hpp"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <iostream>
 
 #include "engine_choice.hpp"
 #include "errors.hpp"
+#include "locations.hpp"
 #include "mesh.hpp"
+#include "output_folder.hpp"
 #include "path.hpp"
+#include "tools.hpp"
+#include "ve_service.hpp"
 #include "ve_templates.hpp"
 #include "versions.hpp"
 
@@ -18,6 +20,8 @@ namespace femxdem {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kServedTrials = 100;  // for how many of them YADE repeats
 
 void say(std::string_view line) { std::cout << line << std::endl; }
 
@@ -47,10 +51,12 @@ double expected_trials(const Case& c) {
   return 3 * increments;
 }
 
-int path_of_volume_element(const Case& c, RunOptions options, int noise_samples) {
+/// Makes the volume element of a case and calls `use` with it; what its making says and decides goes into the options.
+template <class Use>
+int with_volume_element(const Case& c, RunOptions& options, double trials, Use use) {
   WorkerProcess worker(worker_command(c.ve));
   const PreparedRun prepared = prepare_run(worker, c.ve, {single_ve(c)}, options);
-  const auto point = make_local_points(prepared.engine, worker, c.ve, expected_trials(c), options.folder, 1);
+  const auto point = make_local_points(prepared.engine, worker, c.ve, trials, options.folder, 1);
   options.complete = [&](Summary& summary) {
     summary.peak_memory_workers = point->peak_memory();
     summary.threads = point->threads();
@@ -58,7 +64,13 @@ int path_of_volume_element(const Case& c, RunOptions options, int noise_samples)
     summary.engine_check = describe(point->engine_check());
   };
   point->add(prepared.states.front(), 1);
-  return follow_path(c, *point, options, noise_samples);
+  return use(*point);
+}
+
+int path_of_volume_element(const Case& c, RunOptions options, int noise_samples) {
+  options.lock = prepare_output_folder(options.folder, options.existing);
+  return with_volume_element(c, options, expected_trials(c),
+                             [&](LocalPoints& point) { return follow_path(c, point, options, noise_samples); });
 }
 
 /// All volume elements of a case: those of its mesh, or of its seeds where it has none.
@@ -78,25 +90,6 @@ std::vector<VeParameters> pool_of(const Arguments& arguments) {
   return pool;
 }
 
-/// Runs a Python program with this one's modules and waits for it; its exit status.
-int run_program(std::vector<std::string> words) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  std::cout.flush();
-  const pid_t pid = fork();
-  if (pid == 0) {
-    setenv("PYTHONPATH", FEMXDEM_PYTHON_MODULES, 1);
-    setenv("OMP_NUM_THREADS", "1", 1);
-    setenv("HOME", "/tmp", 0);  // Matplotlib looks for it
-    execv(arguments[0], arguments.data());
-    _exit(127);
-  }
-  int status = 0;
-  waitpid(pid, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kPointFailed;
-}
-
 }  // namespace
 
 RunOptions run_options(const Arguments& arguments, const Case& c, const char* ending) {
@@ -111,6 +104,7 @@ RunOptions run_options(const Arguments& arguments, const Case& c, const char* en
                      : arguments.overwrite ? Existing::overwrite
                                            : Existing::refuse;
   options.command_line = arguments.command_line;
+  options.progress = arguments.progress;
   options.versions = library_versions();
   return options;
 }
@@ -137,6 +131,18 @@ int ve_prepare(const Arguments& arguments) {
   return kDone;
 }
 
+int ve_serve(const Arguments& arguments) {
+  refuse_ranks();
+  const Case c = read_path_case(arguments.file, arguments.overrides);
+  refuse_closed_form(c);
+  RunOptions options = run_options(arguments, c);
+  options.folder = fs::temp_directory_path();  // for packings where nothing else can be written
+  return with_volume_element(c, options, kServedTrials, [&](LocalPoints& point) {
+    serve_volume_element(point, std::cin, std::cout);
+    return kDone;
+  });
+}
+
 int ve_inspect(const Arguments& arguments) {
   refuse_ranks();
   fs::path state = arguments.file, folder = arguments.folder;
@@ -158,8 +164,7 @@ int ve_inspect(const Arguments& arguments) {
                     "give the case that names it",
                     state.string()));
   if (folder.empty()) folder = "out" / state.stem();
-  const fs::path script = fs::path(FEMXDEM_YADE_SCRIPTS) / "inspect_ve.py";
-  return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});
+  become_python(locations().yade_scripts / "inspect_ve.py", {state.string(), "--out", folder.string()});
 }
 
 }  // namespace femxdem

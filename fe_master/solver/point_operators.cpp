@@ -23,6 +23,7 @@ PointOperators::PointOperators(const SolverParameters& parameters, std::span<con
       F_n_(reference.size(), Tensor2::Identity()) {
   LearningLimits limits{.min = parameters.qn_min, .max = parameters.qn_max, .skew = parameters.qn_skew};
   if (is_given(parameters.qn_first)) limits.first = parameters.qn_first;
+  if (is_given(parameters.qn_scatter)) limits.scatter = parameters.qn_scatter;
   limits.noise = parameters.qn_noise;
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
@@ -50,13 +51,19 @@ void PointOperators::begin_step(std::span<const Tensor2> F, std::span<const Resp
   }
 }
 
-void PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+Misfit PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+  Misfit sum;
   for (std::size_t p = 0; p < responses.size(); ++p) {
-    if (parameters_.global_operator == GlobalOperator::quasi_newton) learned_[p].learn(F[p], responses[p].stress);
+    if (parameters_.global_operator == GlobalOperator::quasi_newton) {
+      const Misfit misfit = learned_[p].learn(F[p], responses[p].stress);
+      sum.missed += misfit.missed;
+      sum.expected += misfit.expected;
+    }
     if (symmetric() && parameters_.refresh == Refresh::iteration) {
       elastic_[p] = parameters_.operator_scale * responses[p].stiffness;
     }
   }
+  return sum;
 }
 
 int PointOperators::probe(MaterialPoints& points, std::span<const Tensor2> F, std::span<const Response> responses) {

@@ -18,6 +18,7 @@ FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
 TIME_COLUMNS = ("dem_seconds", "wall_s")
 FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
 CACHE = Path(FOLDER.name) / "packings"
+IN_ORDER = ("--set", "ve.sorted_contacts=true")  # sums of forces have the bits of compact cells
 YADE = ("--set", 've.engine="yade"')  # whose trials are processes
 
 
@@ -99,6 +100,24 @@ class Program(unittest.TestCase):
             out, status, said = run(f"ranks{ranks}", ranks=ranks)
             self.assertEqual(status, 0, said)
             self.assertEqual(history(out), self.reference)
+
+    def test_both_engines_have_the_same_history(self):
+        out, status, said = run("yade", *YADE, *IN_ORDER)
+        self.assertEqual(status, 0, said)
+        self.assertIn("engine: YADE", said)
+        self.assertEqual(history(out), self.reference)
+
+    def test_a_run_goes_on_in_the_other_engine_and_on_other_ranks_and_threads(self):
+        first = {"compact": [], "yade": [*YADE, *IN_ORDER]}
+        then = {"compact": ["--set", "ve.threads=2"], "yade": [*YADE, *IN_ORDER]}
+        for before, after, ranks in (("compact", "compact", 3), ("compact", "yade", 2), ("yade", "compact", 2)):
+            name = f"{before}_{after}"
+            _, status, said = run(name, *first[before], "--set", "control.end_time=0.4")
+            self.assertEqual(status, 0, said)
+            out, status, said = run(name, *then[after], "--restart", ranks=ranks)
+            self.assertEqual(status, 0, said)
+            self.assertIn(f"engine: {'YADE' if after == 'yade' else 'compact'}", said)
+            self.assertEqual(history(out), self.reference, name)
 
     def test_killed_rank_leaves_no_worker_and_the_restart_equals_the_uninterrupted_run(self):
         out = Path(FOLDER.name) / "restart"

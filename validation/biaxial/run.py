@@ -35,6 +35,7 @@ SENSITIVITY = {
     "rate_5e-3": Row("128.toml", ("ve.inertial_number=5e-3",), "128 at a quarter of the rate"),
     "rate_2e-3": Row("128.toml", ("ve.inertial_number=2e-3",), "128 at a tenth of the rate"),
     **{f"packing_{n}": Row("128.toml", (f"ve.seed={n}",), f"128, packing {n}") for n in (2, 3, 4, 5)},
+    "pool": Row("128.toml", ("ve.seeds=[1,2,3,4,5]", 've.assignment="random"'), "128, a random field of five packings"),
     "D_1.25e3": Row("128.toml", ("element.D=1.25e3",), "128, half of D"),
     "D_5e3": Row("128.toml", ("element.D=5e3",), "128, twice D"),
     "increment_5e-4": Row("128.toml", ("control.step=0.01", "control.max_step=0.01"), "128, half of the increment"),
