@@ -86,6 +86,8 @@ class CompactCell {
   /// All of kReportFields; "seconds" and "engine_seconds" are those of the last deform. Contacts that slide or adhere
   /// are of now.
   PointReport report() const;
+  /// The rest of a report that trial_report has begun, of the same state; its costs are those of the last deform.
+  void complete(PointReport& report) const;
   /// The unbalanced force and the number of contacts alone, which decide whether an answer is good.
   double unbalanced_force() const;
   std::size_t contacts() const;
@@ -93,6 +95,7 @@ class CompactCell {
   /// network with its grains in equilibrium.
   std::array<double, 81> stiffness(bool relaxed) const;
   VeInfo info() const;
+  double time_step() const;  ///< [s]
   /// The time step becomes what the contact network of now asks for, between load steps: within 1e-12 of what
   /// yade_scripts/time_step.py finds, which sums in another order. With ve.sorted_contacts YADE's cells take it from
   /// here.

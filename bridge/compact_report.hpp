@@ -21,8 +21,8 @@ double time_scale(const CompactHeader& header, double pressure);
 double unbalanced_force(const CompactArrays& arrays);
 /// What judges and counts a trial; NaN in the rest.
 PointReport trial_report(const CompactArrays& arrays, const CompactTrial& trial);
-/// All of it.
-PointReport report(const CompactArrays& arrays, const CompactTrial& trial);
+/// The rest of it, and what the trial has cost.
+void complete_report(const CompactArrays& arrays, const CompactTrial& trial, PointReport& report);
 /// The contacts as springs.
 std::vector<Spring> springs(const CompactArrays& arrays);
 
