@@ -5,7 +5,7 @@ export is told in bridge/compact_scene.hpp.
 """
 
 import math
-from operator import attrgetter, methodcaller
+from operator import attrgetter
 
 import numpy as np
 
@@ -325,10 +325,7 @@ def _matrix(T):
 def _again(O):
     """From rest to rest without time: positions stay, contacts are found anew."""
     O.step()
-    O.subStepping = True
-    for _ in O.engines:
-        O.step()
-    O.subStepping = False
+    contact_laws.to_forces(O)
 
 
 def _enlargement(scene):

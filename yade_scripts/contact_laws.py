@@ -17,7 +17,6 @@ make_new_contacts_adhesive.
 import math
 
 LAWS = ("adhesive", "bonded", "friction")
-NEW_CONTACTS = ("frictional", "adhesive")
 EVERY = 4  # DEM steps between two looks for new contacts
 FINITE_WITHOUT_TIME = {
     "Law2_ScGeom_FrictPhys_CundallStrack",
@@ -175,6 +174,14 @@ def run(O, steps, new_adhesion):
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
             last = O.iter
     _note(O, LOOKS_TAG, added, last)
+
+
+def to_forces(O):
+    """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
+    O.subStepping = True
+    for _ in range(len(O.engines)):
+        O.step()
+    O.subStepping = False
 
 
 def loop_in_order(O):

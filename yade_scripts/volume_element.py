@@ -26,12 +26,7 @@ import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {  # of what no case sets
-    "arguments": (),
-    "script_steps": 1_000_000,
-    "script_seconds": 600.0,
-    "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
-}
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
@@ -90,12 +85,13 @@ class Engine:
         adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
         left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None
-        own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
+        own, itself = self.O.dt, continuation.own(self.O)
         try:
             manifest.update(adoption.adopt(self.O))
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
@@ -148,7 +144,7 @@ class Engine:
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()
         self._utils.calm()
-        self._to_forces()
+        contact_laws.to_forces(self.O)
         O.dt = time_step
         return archive_check.state(O)
 
@@ -182,7 +178,7 @@ class Engine:
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         contact_laws.note_restored(O)
-        self._to_forces()
+        contact_laws.to_forces(O)
         if not kept.put_back(O):
             contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
@@ -233,7 +229,7 @@ class Engine:
                 self._run_sampled(steps, sample_every, late, out_mean, self._grains[ve].new_adhesion)
             else:
                 contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
-                self._to_forces()
+                contact_laws.to_forces(self.O)
         except RuntimeError as error:
             if "larger than half of the cell" not in str(error):
                 raise
@@ -252,7 +248,7 @@ class Engine:
         mean.add(0, self._symmetric_stress())
         for step in mean_stress.sampled_steps(steps, every):
             contact_laws.run(self.O, step - made, new_adhesion)
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             mean.add(step, self._symmetric_stress())
             made = step
         out_mean[:] = mean.mean()
@@ -307,7 +303,7 @@ class Engine:
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)
         elif not relaxed:
-            C = probing.stiffness(self.O, self._love_weber, self._to_forces)
+            C = probing.stiffness(self.O, self._love_weber)
         else:
             raise RuntimeError(
                 "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
@@ -337,14 +333,6 @@ class Engine:
         if self._sums_in_order():
             return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
-
-    def _to_forces(self):
-        """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
-        O = self.O
-        O.subStepping = True
-        for _ in range(len(O.engines)):
-            O.step()
-        O.subStepping = False
 
     def _geometry(self, grains):
         """The numbers of protocol.py's info()."""

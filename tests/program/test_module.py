@@ -14,7 +14,8 @@ BUILD, CASES = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 sys.path.insert(0, str(BUILD))
 import femxdem
 
-FOLDER = Path(tempfile.mkdtemp(prefix="femxdem_module_"))
+KEPT = tempfile.TemporaryDirectory(prefix="femxdem_module_")
+FOLDER = Path(KEPT.name)
 CASE = FOLDER / "point.toml"
 CASE.write_text("""
 material = { type = "volume_element" }
