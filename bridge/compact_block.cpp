@@ -106,7 +106,7 @@ bool consistent(const CompactArrays& a) {
   for (std::uint32_t k = 0; k < h.classes; ++k)
     if (!(a.classes[k].when_broken >= 0 && a.classes[k].when_broken < h.classes && a.classes[k].when_aged < h.classes))
       return false;
-  return h.time_step >= 0 && std::isfinite(h.H[0]) && (h.law == CompactLaw::cohesive || h.law == CompactLaw::friction);
+  return h.time_step >= 0 && std::isfinite(h.H[0]) && h.law <= CompactLaw::paper;
 }
 
 }  // namespace

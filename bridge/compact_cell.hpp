@@ -71,6 +71,13 @@ class CompactCell {
   Deformed deform(const std::array<double, 9>& L, long steps, Sampling sampling);
   Deformed deform(const std::array<double, 9>& L, long steps) { return deform(L, steps, Sampling{}); }
 
+  /// All velocities become zero, those of the cell's deformation too, and with them the dashpots' forces.
+  void rest();
+  /// `steps` further steps of the last deform, without deformation: they count as its own. Why the cell cannot go on.
+  std::optional<std::string> hold(long steps);
+  /// Whether YADE has the law of its contacts, and so can repeat what it does.
+  bool law_of_yade() const;
+
   /// A cell that has become long becomes a shorter one of the same lattice, as in every step of deform: stress and
   /// contacts stay to round-off, so that shear of any size goes on. Whether it was too long.
   bool flip();

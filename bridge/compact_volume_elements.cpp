@@ -71,7 +71,7 @@ CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& 
                                   exported.bytes));
     point.cell = std::make_shared<CompactCell>(CompactCell::from_scene(exported.bytes));
     point.strained.origin = saved ? saved->origin : hash(scene);
-    if (!saved) referee_.add_origin(point.strained.origin, scene);
+    if (!saved && point.cell->law_of_yade()) referee_.add_origin(point.strained.origin, scene);
     const VeInfo info = point.cell->info();
     if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
     point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
@@ -221,8 +221,11 @@ void CompactVolumeElements::deform(Trial& trial) const {
   const CompactCell::Sampling sampling =
       answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
                              : CompactCell::Sampling{};
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
+  const long steps = trial.straining.steps;
+  if (options_.start_at_rest && steps > 0) cell.rest();
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, steps, sampling);
   trial.failure = end.failure;
+  if (!trial.failure && steps > 0) trial.failure = cell.hold(options_.hold_steps);
   if (trial.failure) return;
   trial.report = cell.trial_report();
   trial.found = {

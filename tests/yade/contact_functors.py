@@ -273,7 +273,7 @@ def _made(scene, packing_text, folder, ran):
     if said["what"] == "kn, ks":
         kn, kt = contact_loop.stiffnesses(O, c)
         eq2 = contact_loop.stiffness(c, kn, kt, O.cell.volume)
-        probed = probing.stiffness(O, engine()._love_weber, engine()._to_forces)
+        probed = probing.stiffness(O, engine()._love_weber)
         said["eq2"] = float(np.linalg.norm(eq2 - probed) / np.linalg.norm(probed))
     said["step"], said["step_unbalanced"] = _error_of_step(made["state"])
     return said
