@@ -127,7 +127,14 @@ bool CompactCell::flip() { return femxdem::flip(*block_); }
 Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }
 Row3 CompactCell::stretch() const { return block_->header().trsf; }
 PointReport CompactCell::trial_report() const { return femxdem::trial_report(block_->arrays(), trial_); }
-PointReport CompactCell::report() const { return femxdem::report(block_->arrays(), trial_); }
+void CompactCell::complete(PointReport& report) const { complete_report(block_->arrays(), trial_, report); }
+double CompactCell::time_step() const { return block_->header().time_step; }
+
+PointReport CompactCell::report() const {
+  PointReport whole = trial_report();
+  complete(whole);
+  return whole;
+}
 
 VeInfo CompactCell::info() const {
   const CompactHeader& h = block_->header();

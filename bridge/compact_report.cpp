@@ -166,11 +166,11 @@ PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   return r;
 }
 
-PointReport report(const CompactArrays& a, const CompactTrial& trial) {
-  PointReport r = trial_report(a, trial);
+void complete_report(const CompactArrays& a, const CompactTrial& trial, PointReport& r) {
+  r["dem_steps"] = trial.steps;
+  r["seconds"] = r["engine_seconds"] = trial.seconds;
   report_network(a, r);
   r["mean_rotation"] = mean_rotation(a);
-  return r;
 }
 
 std::vector<Spring> springs(const CompactArrays& a) {

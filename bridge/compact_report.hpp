@@ -19,8 +19,8 @@ double pressure(const Row3& stress);
 double time_scale(const CompactHeader& header, double pressure);
 /// What judges and counts a trial; NaN in the rest.
 PointReport trial_report(const CompactArrays& arrays, const CompactTrial& trial);
-/// All of it.
-PointReport report(const CompactArrays& arrays, const CompactTrial& trial);
+/// The rest of it, and what the trial has cost.
+void complete_report(const CompactArrays& arrays, const CompactTrial& trial, PointReport& report);
 /// The contacts as springs.
 std::vector<Spring> springs(const CompactArrays& arrays);
 
