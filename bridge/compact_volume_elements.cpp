@@ -18,10 +18,6 @@
 namespace femxdem {
 namespace {
 
-using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
-
 /// A number in [0, 1) that the trial's number and the point decide (splitmix64, Steele, Lea, Flood 2014).
 double drawn(std::uint64_t trial) {
   std::uint64_t z = trial * 0x9e3779b97f4a7c15ull + 0x9e3779b97f4a7c15ull;
@@ -61,7 +57,7 @@ CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& 
                                   exported.bytes));
     point.cell = std::make_shared<CompactCell>(CompactCell::from_scene(exported.bytes));
     point.strained.origin = saved ? saved->origin : hash(scene);
-    if (!saved) referee_.add_origin(point.strained.origin, scene);
+    if (!saved && point.cell->law_of_yade()) referee_.add_origin(point.strained.origin, scene);
     const VeInfo info = point.cell->info();
     if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
     point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
@@ -211,8 +207,11 @@ void CompactVolumeElements::deform(Trial& trial) const {
   const CompactCell::Sampling sampling =
       answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
                              : CompactCell::Sampling{};
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
+  const long steps = trial.straining.steps;
+  if (options_.start_at_rest && steps > 0) cell.rest();
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, steps, sampling);
   trial.failure = end.failure;
+  if (!trial.failure && steps > 0) trial.failure = cell.hold(options_.hold_steps);
   if (trial.failure) return;
   trial.report = cell.trial_report();
   trial.found = {tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
@@ -240,8 +239,7 @@ void CompactVolumeElements::check(const Trial& trial) {
 
 void CompactVolumeElements::commit() {
   if (size() == 0) return;
-  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
-  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  require_committable(trial_pending_, trial_failed_);
   std::vector<Point> ends(trials_.size());
   in_parallel(trials_.size(), [&](std::size_t t) {
     CompactCell& cell = *trials_[t].cell;
@@ -288,8 +286,7 @@ SavedStates CompactVolumeElements::save() {
 }
 
 void CompactVolumeElements::load(const SavedStates& states) {
-  if (states.size() != size())
-    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
+  require_as_many(states.size(), size());
   std::map<std::string_view, Point> known;  // equal states are one cell
   std::vector<Point> loaded;
   for (std::size_t p = 0; p < size(); ++p) {

@@ -108,4 +108,14 @@ void require_answerable(Operator wanted, std::size_t gradients, std::size_t poin
   if (gradients != points) throw std::invalid_argument("evaluate: one deformation gradient per volume element");
 }
 
+void require_committable(bool trial_pending, bool trial_failed) {
+  if (!trial_pending) throw std::logic_error("commit: there is no trial");
+  if (trial_failed) throw std::logic_error("commit: a volume element failed in this trial");
+}
+
+void require_as_many(std::size_t states, std::size_t points) {
+  if (states != points)
+    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states, points));
+}
+
 }  // namespace femxdem

@@ -50,6 +50,8 @@ class Kept:
         if self._of_bodies is None:
             return False
         for i in O.interactions:
+            if (i.id1, i.id2) not in self._of_contacts:
+                continue  # it forms in the step to come
             adhesion, forces = self._of_contacts[i.id1, i.id2]
             for name, force in zip(OF_CONTACTS, forces):
                 setattr(i.phys, name, force)

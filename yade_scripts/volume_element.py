@@ -26,12 +26,7 @@ import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {  # of what no case sets
-    "arguments": (),
-    "script_steps": 1_000_000,
-    "script_seconds": 600.0,
-    "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
-}
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
@@ -90,17 +85,19 @@ class Engine:
         adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
         left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None
-        own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
+        own, itself = self.O.dt, continuation.own(self.O)
         try:
             manifest.update(adoption.adopt(self.O))
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(self._scales(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(spheres=grains.count, mean_diameter=grains.mean_diameter, volume=self.O.cell.volume)
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
@@ -148,7 +145,7 @@ class Engine:
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()
         self._utils.calm()
-        self._to_forces()
+        contact_laws.to_forces(self.O)
         O.dt = time_step
         return archive_check.state(O)
 
@@ -182,7 +179,7 @@ class Engine:
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         contact_laws.note_restored(O)
-        self._to_forces()
+        contact_laws.to_forces(O)
         if not kept.put_back(O):
             contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
@@ -220,7 +217,7 @@ class Engine:
 
     def info(self, ve):
         self._select(ve)
-        return self._geometry(self._grains[ve])
+        return self._scales(self._grains[ve])
 
     def deform(self, ve, velocity_gradient, steps, sample_every=0, late=0.0, out_mean=None):
         self._select(ve)
@@ -233,7 +230,7 @@ class Engine:
                 self._run_sampled(steps, sample_every, late, out_mean, self._grains[ve].new_adhesion)
             else:
                 contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
-                self._to_forces()
+                contact_laws.to_forces(self.O)
         except RuntimeError as error:
             if "larger than half of the cell" not in str(error):
                 raise
@@ -252,7 +249,7 @@ class Engine:
         mean.add(0, self._symmetric_stress())
         for step in mean_stress.sampled_steps(steps, every):
             contact_laws.run(self.O, step - made, new_adhesion)
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             mean.add(step, self._symmetric_stress())
             made = step
         out_mean[:] = mean.mean()
@@ -307,7 +304,7 @@ class Engine:
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)
         elif not relaxed:
-            C = probing.stiffness(self.O, self._love_weber, self._to_forces)
+            C = probing.stiffness(self.O, self._love_weber)
         else:
             raise RuntimeError(
                 "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
@@ -338,25 +335,11 @@ class Engine:
             return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
 
-    def _to_forces(self):
-        """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
-        O = self.O
-        O.subStepping = True
-        for _ in range(len(O.engines)):
-            O.step()
-        O.subStepping = False
-
-    def _geometry(self, grains):
+    def _scales(self, grains):
         """The numbers of protocol.py's info()."""
-        pressure = -np.trace(self._love_weber()) / 3
-        return {
-            "time_step": grains.unit.seconds(self.O.dt),
-            "time_scale": _time_scale(grains, pressure),
-            "volume": self.O.cell.volume,
-            "spheres": grains.count,
-            "mean_diameter": grains.mean_diameter,
-            "mean_stress": float(pressure),
-        }
+        pressure = float(-np.trace(self._love_weber()) / 3)
+        time_scale = _time_scale(grains, pressure)
+        return {"time_step": grains.unit.seconds(self.O.dt), "time_scale": time_scale, "mean_stress": pressure}
 
     def _equilibrium(self, grains):
         """What a trial is judged by."""

@@ -49,7 +49,6 @@ void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint)
   h5.set_attribute("/", "step", checkpoint.step);
   h5.set_attribute("/", "time", checkpoint.time);
   h5.set_attribute("/", "dt", checkpoint.dt);
-  h5.set_attribute("/", "case_hash", checkpoint.case_hash);
   h5.make_group("/versions");
   for (const auto& [name, version] : checkpoint.versions) h5.set_attribute("/versions", name, version);
   int order = 0;
@@ -58,18 +57,9 @@ void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint)
     h5.write(group + "/values", values, {values.size()});
     h5.set_attribute(group, "name", name);
   }
-  if (!checkpoint.case_text.empty()) h5.write_bytes("/case", checkpoint.case_text);
+  h5.write_bytes("/case", checkpoint.case_text);
   write_states(h5, checkpoint.states);
   h5.finish();
-}
-
-void refuse_other_case(const std::filesystem::path& file, const Hdf5File& h5, const std::string& case_hash) {
-  const std::string theirs = h5.text("/", "case_hash");
-  if (theirs == case_hash) return;
-  throw UserError(fmt::format(
-      "{}: belongs to another case (hash {}, this case has {}); restart with the case it was written by or choose "
-      "another --out",
-      file.string(), theirs, case_hash));
 }
 
 void refuse_other_versions(const std::filesystem::path& file, const Hdf5File& h5,
@@ -91,7 +81,7 @@ Checkpoint read_contents(const Hdf5File& h5) {
   checkpoint.step = static_cast<int>(h5.number("/", "step"));
   checkpoint.time = h5.number("/", "time");
   checkpoint.dt = h5.number("/", "dt");
-  checkpoint.case_hash = h5.text("/", "case_hash");
+  checkpoint.case_text = h5.read_bytes("/case");
   for (const std::string& name : h5.attributes("/versions")) checkpoint.versions[name] = h5.text("/versions", name);
   for (const std::string& order : h5.members("/arrays")) {
     const std::string group = "/arrays/" + order;
@@ -116,14 +106,12 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
   }
 }
 
-Checkpoint read_checkpoint(const std::filesystem::path& file, const std::string& case_hash,
-                           const std::map<std::string, std::string>& versions) {
+Checkpoint read_checkpoint(const std::filesystem::path& file, const std::map<std::string, std::string>& versions) {
   if (!std::filesystem::exists(file)) {
     throw UserError(fmt::format("{}: no checkpoint to restart from; start without --restart", file.string()));
   }
   try {
     const Hdf5File h5(file, Hdf5File::Mode::read);
-    refuse_other_case(file, h5, case_hash);
     refuse_other_versions(file, h5, versions);
     return read_contents(h5);
   } catch (const Hdf5Error&) {

@@ -7,8 +7,8 @@
 
 #include "analytic_points.hpp"
 #include "errors.hpp"
-#include "nonlinear_solver.hpp"
 #include "path_driver.hpp"
+#include "problem.hpp"
 #include "step_size.hpp"
 
 namespace femxdem {
@@ -46,13 +46,6 @@ std::vector<double> values(const Tensor2& F, const Response& response) {
   return row;
 }
 
-SolverParameters parameters_of(const Case& c) {
-  const bool on_volume_element = c.material.type == MaterialType::volume_element;
-  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_element);
-  if (on_volume_element) parameters.answer_at = answer_at(c.ve);
-  return parameters;
-}
-
 /// The steps along the segments and the files that they fill.
 class Path {
  public:
@@ -79,7 +72,7 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
     : case_(c),
       options_(options),
       noise_samples_(noise_samples),
-      parameters_(parameters_of(c)),
+      parameters_(solver_parameters(c)),
       driver_(point, parameters_),
       files_(c, options) {
   files_.begin_history(columns(noise_samples > 0));

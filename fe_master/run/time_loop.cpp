@@ -49,8 +49,6 @@ class TimeLoop {
     long answers = 0;
     double error = 0;  // largest that was accepted
   } reuse_, reuse_of_step_;
-  int last_checkpoint_ = 0;  // step of the one on the disk, 0: none
-  double whole_time_ = 0;    // of the last step of which every file has what it should
 };
 
 TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed)
@@ -90,7 +88,7 @@ int TimeLoop::go() {
                                       files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
-    throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
+    throw DiskError(files_.stopped_by_the_disk(error.what()));
   } catch (const std::exception& error) {
     files_.finish(kPointFailed, error.what());
     throw;
@@ -180,8 +178,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   const int checkpoint_every = case_.output.checkpoint_every;
   if (checkpoint_every > 0 && files_.summary.steps % checkpoint_every == 0) write_state();
-  files_.whole(last_checkpoint_);
-  whole_time_ = now.time;
+  files_.whole(now.time);
 }
 
 /// Of history.csv, beside those of every run.
@@ -210,8 +207,8 @@ void TimeLoop::write_fields() {
 }
 
 void TimeLoop::write_state() {
-  Checkpoint checkpoint{files_.summary.steps,     solver_.time(),    size_.size(),          {}, {},
-                        files_.summary.case_hash, options_.versions, comparable_toml(case_)};
+  Checkpoint checkpoint{files_.summary.steps,   solver_.time(),   size_.size(), {}, {},
+                        comparable_toml(case_), options_.versions};
   solver_.save(checkpoint.arrays);
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back(
@@ -220,7 +217,7 @@ void TimeLoop::write_state() {
     checkpoint.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
   checkpoint.states = points_.save();
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
-  last_checkpoint_ = files_.summary.steps;
+  files_.checkpoint_written();
   files_.log.note(fmt::format("checkpoint after step {}", files_.summary.steps));
 }
 
@@ -230,9 +227,9 @@ void TimeLoop::restart() {
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
   size_.set_size(resumed_.dt);
-  files_.summary.steps = last_checkpoint_ = resumed_.step;
-  whole_time_ = resumed_.time;
-  files_.whole(last_checkpoint_);
+  files_.summary.steps = resumed_.step;
+  files_.checkpoint_written();
+  files_.whole(resumed_.time);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
   if (reuses()) {
@@ -252,7 +249,8 @@ int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options
   Checkpoint resumed;
   if (options.existing == Existing::resume) {
     const std::filesystem::path file = options.folder / "checkpoint.h5";
-    resumed = read_checkpoint(file, hash_of_restart(file, problem.parameters()), options.versions);
+    resumed = read_checkpoint(file, options.versions);
+    refuse_other_case(file, resumed, problem.parameters());
   }
   std::optional<TimeLoop> loop;
   try {

@@ -134,19 +134,19 @@ class States(unittest.TestCase):
 
     def test_what_is_not_a_state_is_refused(self):
         good = cell("bonded").save()
-        self.assertIsNone(compact_cell.why_invalid(good))
+        CompactCell.load(good)
         version = bytearray(good)
         version[8] += 1
         cut = (good[:-64], "bytes"), (good[:100], "truncated"), (b"", "truncated")
         for bad, word in (*cut, (bytes(version), "version")):
-            self.assertIn(word, compact_cell.why_invalid(bad))
             with self.assertRaisesRegex(compact_cell.UserError, word):
                 CompactCell.load(bad)
         rng = np.random.default_rng(0)
         for at in rng.integers(0, len(good), 200):
             flipped = bytearray(good)
             flipped[at] ^= 1 << int(rng.integers(8))
-            self.assertIsNotNone(compact_cell.why_invalid(bytes(flipped)), f"byte {at}")
+            with self.assertRaises(compact_cell.UserError, msg=f"byte {at}"):
+                CompactCell.load(bytes(flipped))
 
     def test_what_is_not_an_export_is_refused(self):
         good = exported("friction")
@@ -206,7 +206,6 @@ class Reports(unittest.TestCase):
                 self.assertAlmostEqual(own["sliding_contacts"], report["sliding_contacts"], delta=either_way + 1e-12)
                 for field in set(FIELDS) - {"seconds", "engine_seconds", "sliding_contacts"}:
                     np.testing.assert_allclose(own[field], report[field], rtol=1e-11, atol=1e-13, err_msg=field)
-                self.assertEqual(own["unbalanced_force"], c.unbalanced_force())
             for key, value in engine().info(ve).items():
                 np.testing.assert_allclose(c.info()[key], value, rtol=1e-12, err_msg=key)
 
@@ -289,7 +288,7 @@ class Flips(unittest.TestCase):
         """What deform does, but for them."""
         for _ in range(steps):
             O.step()
-        engine()._to_forces()
+        contact_laws.to_forces(engine().O)
 
     def test_both_engines_flip_at_the_same_steps_with_equal_bits(self):
         for name in ("adhesive", "friction"):
