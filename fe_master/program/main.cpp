@@ -207,6 +207,9 @@ int main(int argc, char** argv) {
   run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
   add_case(check_command);
+  CLI::App* advise_command =
+      app.add_subcommand("advise", "Advice before a run, from short probes of its volume element");
+  advise_command->prefix_command()->set_help_flag();  // advise.py has its own
   CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
   parameters_command->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
 
@@ -237,6 +240,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (*run_command) return run(arguments);
     if (*check_command) return check(arguments);
+    if (*advise_command) return advise(advise_command->remaining());
     if (*path_command) return ve_path(ve_arguments(arguments));
     if (*prepare_command) return ve_prepare(ve_arguments(arguments));
     if (*inspect_command) return ve_inspect(ve_arguments(arguments));

@@ -162,4 +162,12 @@ int ve_inspect(const VeArguments& arguments) {
   return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});
 }
 
+int advise(const std::vector<std::string>& words) {
+  refuse_ranks();
+  std::vector<std::string> command = {FEMXDEM_PYTHON, std::string(FEMXDEM_PROGRAM) + "/advise.py", "--femxdem",
+                                      fs::read_symlink("/proc/self/exe").string()};
+  command.insert(command.end(), words.begin(), words.end());
+  return run_program(std::move(command));
+}
+
 }  // namespace femxdem

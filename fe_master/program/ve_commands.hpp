@@ -25,4 +25,7 @@ int ve_prepare(const VeArguments& arguments);
 /// Draws packing, force chains and fabric rose of the case's first volume element, or of a prepared state, as PNG.
 int ve_inspect(const VeArguments& arguments);
 
+/// Advice before a run, from short probes of its volume element: advise.py with these words. Returns the exit status.
+int advise(const std::vector<std::string>& words);
+
 }  // namespace femxdem
