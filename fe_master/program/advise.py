@@ -10,6 +10,7 @@ what that asks for, the cost of the run, and what the scene does not need. --wri
 
 import argparse
 import json
+import os
 import re
 import subprocess
 import sys
@@ -302,8 +303,8 @@ def main():
     p.add_argument("--write", type=Path, help="write the case with the advice in it to this file")
     p.add_argument("--out", type=Path, help="folder of the probes (default: out/NAME_advice)")
     p.add_argument("--set", dest="sets", action="append", default=[], metavar="section.key=value")
-    p.add_argument("--femxdem", default="femxdem", help=argparse.SUPPRESS)
     a = p.parse_args()
+    program = os.environ.get("FEMXDEM", "femxdem")  # of program/tools.cpp
     try:
         if not 1e-3 <= a.error <= 0.5:
             raise AdviceError(f"--error {a.error:g}: a relative error between 0.001 and 0.5")
@@ -312,7 +313,7 @@ def main():
         case = read(a.case, a.sets)
         folder = (a.out or Path("out") / (a.case.stem + "_advice")).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        said = advise(case, a.case.resolve(), a.femxdem, folder, a.error, a.band, points_of(a.femxdem, a.case, a.sets))
+        said = advise(case, a.case.resolve(), program, folder, a.error, a.band, points_of(program, a.case, a.sets))
         print(said)
         values = {".".join(key): value for key, value in said.values.items()}
         (folder / "advice.json").write_text(json.dumps({"advice": said.lines, "values": values, **said.numbers}, indent=1))

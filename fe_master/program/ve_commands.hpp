@@ -22,10 +22,10 @@ int ve_path(VeArguments arguments);
 /// Makes the case's volume elements where the cache does not have them and prints their manifests.
 int ve_prepare(const VeArguments& arguments);
 
+/// Answers strains of the case's first volume element, see serve_volume_element.
+int ve_serve(VeArguments arguments);
+
 /// Draws packing, force chains and fabric rose of the case's first volume element, or of a prepared state, as PNG.
 int ve_inspect(const VeArguments& arguments);
-
-/// Advice before a run, from short probes of its volume element: advise.py with these words. Returns the exit status.
-int advise(const std::vector<std::string>& words);
 
 }  // namespace femxdem
