@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <exception>
 #include <fstream>
 #include <map>
+#include <mutex>
 #include <numeric>
 #include <set>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -185,17 +188,31 @@ CompactVolumeElements::Cell CompactVolumeElements::spare_cell() {
   return cell;
 }
 
-/// The work of `count` items by the threads of this rank; items are taken in order, as threads become free.
+/// The work of `count` items by the threads of this rank; items are taken in order, as threads become free. Where the
+/// system gives fewer threads, fewer work; what one of them throws is thrown once all have ended.
 template <class Work>
 void CompactVolumeElements::in_parallel(std::size_t count, Work work) const {
   std::atomic<std::size_t> next{0};
+  std::exception_ptr thrown;
+  std::mutex guard;
   const auto serve = [&] {
-    for (std::size_t item = next++; item < count; item = next++) work(item);
+    try {
+      for (std::size_t item = next++; item < count; item = next++) work(item);
+    } catch (...) {  // thrown again below
+      const std::lock_guard hold(guard);
+      thrown = std::current_exception();
+    }
   };
-  std::vector<std::jthread> helpers;
-  for (std::size_t t = 1; t < std::min<std::size_t>(static_cast<std::size_t>(compact_.threads), count); ++t)
-    helpers.emplace_back(serve);
-  serve();
+  {
+    std::vector<std::jthread> helpers;
+    try {
+      for (std::size_t t = 1; t < std::min<std::size_t>(static_cast<std::size_t>(compact_.threads), count); ++t)
+        helpers.emplace_back(serve);
+    } catch (const std::system_error&) {  // no more of them
+    }
+    serve();
+  }
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {

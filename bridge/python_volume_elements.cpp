@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "compact_cell.hpp"
@@ -69,11 +71,32 @@ std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F,
     worker_.slot(i).task = plans[i].refusal ? Task::skip : Task::deform;
     responses[i].failure = plans[i].refusal;
   }
+  worker_.be_patient(patience(plans));
   run_trial(wanted == Operator::elastic, responses);
+  note_cost(plans);
   for (std::size_t i = 0; i < size(); ++i)
     if (!responses[i].failure) read(i, plans[i], wanted, responses[i]);
   trial_failed_ = std::any_of(responses.begin(), responses.end(), [](const Response& r) { return r.failure; });
   return responses;
+}
+
+/// A hundred times what the dearest DEM step so far would take: a process that waits for a processor is no dead one.
+double PythonVolumeElements::patience(const std::vector<Straining>& plans) const {
+  constexpr double kTimes = 100, kLeast = 60;  // [-], [s]
+  if (seconds_per_step_ == 0) return std::numeric_limits<double>::infinity();
+  long most = 1;
+  for (const Straining& plan : plans) most = std::max(most, plan.steps);
+  return std::max(kLeast, kTimes * seconds_per_step_ * static_cast<double>(most));
+}
+
+void PythonVolumeElements::note_cost(const std::vector<Straining>& plans) {
+  constexpr auto seconds = std::find(kReportFields.begin(), kReportFields.end(), "seconds") - kReportFields.begin();
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Slot& slot = worker_.slot(i);
+    if (slot.task != Task::deform || slot.outcome != Outcome::answered) continue;
+    seconds_per_step_ =
+        std::max(seconds_per_step_, slot.report[seconds] / static_cast<double>(std::max(plans[i].steps, 1L)));
+  }
 }
 
 Straining PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {

@@ -16,10 +16,15 @@ class AppendedFile {
   AppendedFile(const AppendedFile&) = delete;
   AppendedFile& operator=(const AppendedFile&) = delete;
   void write(std::string_view text);
+  /// False when somebody has removed, replaced or shortened the file since.
+  bool is_in_place() const;
+  /// Goes on in the file of that name, a new one if there is none.
+  void open_again();
 
  private:
   std::filesystem::path file_;
   int descriptor_;
+  std::int64_t size_ = 0;  ///< of the file after the last write
 };
 
 /// Writes beside `file`, makes sure of the disk and renames: a reader sees the old text or the new one, never half of

@@ -12,6 +12,7 @@
 
 #include "disk_file.hpp"
 #include "errors.hpp"
+#include "hdf5_journal.hpp"
 
 namespace femxdem {
 namespace {
@@ -54,7 +55,10 @@ Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access, false, true);
   const std::string name = file.string();
+  if (mode == Mode::update) finish_update(file);
+  if (mode == Mode::update && !journal_updates(access)) fail("HDF5 refuses the driver of updates", "/");
   if (mode == Mode::create) {
+    forget_update(file);
     id_ = H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
   } else {
     id_ = H5Fopen(name.c_str(), mode == Mode::read ? H5F_ACC_RDONLY : H5F_ACC_RDWR, access);

@@ -22,7 +22,8 @@ struct Hdf5Error : std::runtime_error {
 /// inside the file start with '/'; missing groups on the way are made.
 class Hdf5File {
  public:
-  enum class Mode { create, read, update };  ///< create truncates; read and update want an existing file
+  /// create truncates; read and update want an existing file; an update is all in the file or not at all (hdf5_journal.hpp)
+  enum class Mode { create, read, update };
 
   /// Opens without file locks: a reader such as ParaView must not stop a run that goes on writing.
   Hdf5File(const std::filesystem::path& file, Mode mode);
