@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <numeric>
+#include <system_error>
 #include <utility>
 
 #include "disk_file.hpp"
@@ -69,8 +70,12 @@ Hdf5File::~Hdf5File() {
 
 void Hdf5File::reserve(std::uint64_t bytes, std::size_t data_sets) {
   constexpr std::uint64_t kTables = 1024, kFile = 16384;  // header and place in its group: 630 bytes as measured
+  hsize_t end = 0;  // what it has given out already may lie behind the end of the file
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file_, error);
+  if (H5Fget_filesize(id_, &end) < 0 || error || end < size) end = size;
   try {
-    reserve_space(file_, bytes + kTables * data_sets + kFile);
+    reserve_space(file_, end - size + bytes + kTables * data_sets + kFile);
   } catch (const DiskError&) {
     broken_ = true;
     throw;

@@ -13,6 +13,8 @@
 
 #include "analytic_points.hpp"
 #include "case.hpp"
+#include "end_request.hpp"
+#include "end_signals.hpp"
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
@@ -35,10 +37,12 @@ struct Arguments {
   std::vector<std::string> overrides;
   bool restart = false;
   bool overwrite = false;
+  std::string time_limit;
   int noise_samples = 0;
   int compare = 0;
   bool markdown = false;
   std::string command_line;
+  Moment start = Moment::clock::now();
 };
 
 /// MPI for the life of the program; the worker must have been started before.
@@ -51,6 +55,7 @@ struct Mpi {
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
     MPI_Comm_size(machine, &of_machine);
     MPI_Comm_free(&machine);
+    if (rank > 0) ignore_end_signals();
   }
   ~Mpi() { MPI_Finalize(); }
   Mpi(const Mpi&) = delete;
@@ -75,10 +80,18 @@ void keep_standard_descriptors() {
     if (fcntl(descriptor, F_GETFD) < 0) open("/dev/null", O_RDWR);
 }
 
-/// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
+/// True on the rank that speaks; known before MPI_Init from the environment of Open MPI or of Slurm's srun.
 bool speaks() {
-  const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
-  return rank == nullptr || std::string(rank) == "0";
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
+    if (const char* rank = std::getenv(name)) return std::string(rank) == "0";
+  return true;
+}
+
+/// By when this process must have ended: --time-limit, counted from its start, or the end of the scheduler's job.
+std::optional<Moment> ends_before(const Arguments& arguments) {
+  if (arguments.time_limit.empty()) return end_of_job();
+  const std::chrono::duration<double> limit(seconds_of(arguments.time_limit));
+  return arguments.start + std::chrono::duration_cast<Moment::duration>(limit);
 }
 
 RunOptions run_options(const Arguments& arguments) {
@@ -89,6 +102,7 @@ RunOptions run_options(const Arguments& arguments) {
                                            : Existing::refuse;
   options.command_line = arguments.command_line;
   options.versions = library_versions();
+  options.ends_before = ends_before(arguments);
   return options;
 }
 
@@ -185,6 +199,7 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);                                         // a limit on files' sizes is an error of write
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
   Arguments arguments;
+  speaks() ? end_at_signals() : ignore_end_signals();
   for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
 
   CLI::App app("femxdem: finite elements whose material is a volume element of spheres in YADE");
@@ -196,6 +211,12 @@ int main(int argc, char** argv) {
         std::exit(kDone);
       },
       "Versions of the program and of what it uses, and what is missing");
+  const auto add_restart = [&](CLI::App* command) {
+    command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+    command->add_option("--time-limit", arguments.time_limit,
+                        "Save and end with status 75 before so much time is over: seconds, MM:SS, HH:MM:SS or "
+                        "D-HH:MM:SS (default: the end of the Slurm job)");
+  };
   const auto add_case = [&](CLI::App* command) {
     command->add_option("case", arguments.case_file, "Case file (TOML)")->required();
     command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
@@ -203,7 +224,7 @@ int main(int argc, char** argv) {
   CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
   add_case(run_command);
   run_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
-  run_command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  add_restart(run_command);
   run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
   add_case(check_command);
@@ -215,6 +236,7 @@ int main(int argc, char** argv) {
   CLI::App* path_command = ve_command->add_subcommand("path", "Follow the [[path]] of a case with one material point");
   add_case(path_command);
   path_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
+  add_restart(path_command);
   path_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   path_command
       ->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")

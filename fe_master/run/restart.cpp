@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "errors.hpp"
-#include "hdf5_file.hpp"
 
 namespace femxdem {
 namespace {
@@ -72,22 +71,13 @@ std::string differing_keys(const std::string& theirs, const std::string& ours) {
   return text;
 }
 
-std::string hash_of_restart(const std::filesystem::path& checkpoint, const Case& c) {
-  if (!std::filesystem::exists(checkpoint)) return case_hash(c);
-  std::string theirs, text;
-  double time = 0;
-  try {
-    const Hdf5File h5(checkpoint, Hdf5File::Mode::read);
-    theirs = h5.text("/", "case_hash");
-    time = h5.number("/", "time");
-    if (h5.exists("/case")) text = h5.read_bytes("/case");
-  } catch (const Hdf5Error&) {
-    return case_hash(c);  // read_checkpoint says what is wrong with it
-  }
+std::string hash_of_restart(const CheckpointFile& checkpoint, const Case& c) {
+  const std::string theirs = checkpoint.case_hash(), text = checkpoint.case_text();
+  const double time = checkpoint.time();
   const std::string ours = comparable_toml(c);
   if (theirs == case_hash(c) || text.empty()) return case_hash(c);
   const std::set<std::string> keys = differing(parameters(text), parameters(ours));
-  const std::string where = checkpoint.string();
+  const std::string where = checkpoint.file().string();
   if (keys != std::set<std::string>{"control.end_time"})
     throw UserError(
         fmt::format("{}: belongs to another case, which differs in {}; restart with the case it was written by or "

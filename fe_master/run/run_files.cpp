@@ -47,7 +47,10 @@ std::string RunFiles::stopped_by_the_disk(const std::string& reason, double time
 }
 
 int RunFiles::finish(int status, const std::string& message) {
-  summary.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
+  summary.status = status == kDone           ? "done"
+                   : status == kNotConverged ? "not converged"
+                   : status == kRunAgain     ? "stopped"
+                                             : "failed";
   summary.message = message;
   summary.exit_status = status;
   summary.wall_seconds = wall();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "case.hpp"
+#include "end_request.hpp"
 #include "errors.hpp"
 #include "history.hpp"
 #include "log.hpp"
@@ -25,8 +26,9 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
-  std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
-  std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
+  std::vector<std::string> remarks;   ///< for log.txt: the engine; what was adopted, dropped, reset
+  std::shared_ptr<FolderLock> lock;   ///< of the folder where it is prepared already
+  std::optional<Moment> ends_before;  ///< the process must have ended by then
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 
