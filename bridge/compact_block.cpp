@@ -135,7 +135,8 @@ void CompactBlock::bind() {
 }
 
 void CompactBlock::assign(const CompactBlock& other) {
-  lines_.resize(other.lines_.size());
+  if (lines_.capacity() < other.lines_.size()) std::vector<Line>(other.lines_.size()).swap(lines_);
+  lines_.resize(other.lines_.size());  // which would take twice the room, had it to grow
   std::memcpy(static_cast<void*>(lines_.data()), other.lines_.data(), other.lines_.size() * kLine);
   bind();
 }

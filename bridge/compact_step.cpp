@@ -182,7 +182,7 @@ std::uint32_t class_of_new(const CompactArrays& a, double tangent) {
 }
 
 void step(CompactBlock& block) {
-  flip_when_narrow(block);
+  flip(block);
   Row3 G;
   const double reach = move(block.header(), block.arrays(), G);
   ++block.header().iteration;

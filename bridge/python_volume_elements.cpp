@@ -188,10 +188,7 @@ void PythonVolumeElements::load_into(std::span<const std::size_t> points, const 
     const VeState saved =
         decode(state).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, state});
     const bool compact = saved.engine == EngineKind::compact;
-    if (compact && saved.origin != point.origin)
-      throw UserError(
-          "checkpoint: a volume element was made from another packing than the case's; restart with the packings that "
-          "it was run with (ve.cache)");
+    if (compact) require_origin(saved.origin, point.origin);
     worker_.request(compact ? Command::write_back : Command::load, static_cast<std::int64_t>(i), 0,
                     compact ? CompactCell::load(saved.bytes).to_scene() : saved.bytes);
     points_[i].reference_time_scale = saved.reference_time_scale;

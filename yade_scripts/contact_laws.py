@@ -17,7 +17,6 @@ make_new_contacts_adhesive.
 import math
 
 LAWS = ("adhesive", "bonded", "friction")
-NEW_CONTACTS = ("frictional", "adhesive")
 EVERY = 4  # DEM steps between two looks for new contacts
 FINITE_WITHOUT_TIME = {
     "Law2_ScGeom_FrictPhys_CundallStrack",
@@ -157,21 +156,32 @@ def _noted(O, tag):
 
 
 def run(O, steps, new_adhesion):
-    """`steps` DEM steps. With new_adhesion = (f_c, friction), the contacts that have formed since the last look become
-    adhesive at every step number divisible by EVERY: by the scene's own count (steps_made), so that no split and no
-    restart moves it."""
-    step = O.step
+    """`steps` DEM steps. Before the cell moves, one that has become long flips, by YADE's own Cell.flipCell (its
+    flipFlippable flips after the move, and not in a step that is made part by part). With new_adhesion = (f_c, friction),
+    the contacts that have formed since the last look become adhesive at every step number divisible by EVERY: by the
+    scene's own count (steps_made), so that no split and no restart moves it."""
+    step, flip = O.step, O.cell.flipCell
     if not new_adhesion:
         for _ in range(steps):
             step()
+            flip()
         return
     added, last = looks_for_new_contacts(O)
     for _ in range(steps):
         step()
+        flip()
         if (O.iter - added) % EVERY == 0:
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
             last = O.iter
     _note(O, LOOKS_TAG, added, last)
+
+
+def to_forces(O):
+    """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
+    O.subStepping = True
+    for _ in range(len(O.engines)):
+        O.step()
+    O.subStepping = False
 
 
 def loop_in_order(O):

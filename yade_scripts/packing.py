@@ -19,13 +19,13 @@ MAX_STEPS = 400_000
 
 def prepare(O, spec):
     """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest. `spec` is the whole [ve]
-    table of a case: `femxdem parameters` has its units, and the only defaults.
+    table of a case, which has checked it: `femxdem parameters` has its units, bounds, and the only defaults.
 
     Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii
     are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
-    Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
+    Raises RuntimeError when equilibrium is not reached.
     """
-    p = _checked(dict(spec))
+    p = dict(spec)
     unit = unit_of_time.suited(p["confining_stress"], p["density"], p["spheres"])
     unit_of_time.note(O, unit)
     p["density"] = unit.scene_density(p["density"])  # all times and rates of the scene follow from it
@@ -56,22 +56,6 @@ def prepare(O, spec):
         contact_laws.make_new_contacts_adhesive(O, f_c, p["friction"])
     O.engines[-1].damping = p["damping"]
     O.interactions.serializeSorted = True  # contacts come back from a saved scene in the order of the spheres
-
-
-def _checked(p):
-    if p["contact_law"] not in contact_laws.LAWS:
-        known = ", ".join(contact_laws.LAWS)
-        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {known}.")
-    if p["cohesion"] > 0 and p["contact_law"] == "friction":
-        raise ValueError("ve.cohesion > 0 needs ve.contact_law = \"adhesive\" or \"bonded\"; \"friction\" has none.")
-    if p["new_contacts"] not in contact_laws.NEW_CONTACTS:
-        known = ", ".join(contact_laws.NEW_CONTACTS)
-        raise ValueError(f"ve.new_contacts = \"{p['new_contacts']}\" is unknown: use one of {known}.")
-    if p["new_contacts"] == "adhesive" and not (p["contact_law"] == "adhesive" and p["cohesion"] > 0):
-        raise ValueError('ve.new_contacts = "adhesive" needs ve.contact_law = "adhesive" and ve.cohesion > 0.')
-    if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
-        raise ValueError("ve needs spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0.")
-    return p
 
 
 def _loose_cell(O, p, kn, side, positions, radii):

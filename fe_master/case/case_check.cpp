@@ -267,6 +267,12 @@ void check_solver(const Case& c, Mistakes& m) {
           fmt::format("solver.tolerance = {:g} is below {:.1e}, which the noise {:g} of the volume element's stress "
                       "allows; raise it, or lower ve.inertial_number or take more spheres and measure again",
                       c.solver.tolerance, floor, c.solver.noise));
+  if (c.solver.reuse_below > 0 && c.solver.global_operator != GlobalOperator::quasi_newton)
+    m.add("solver.reuse_below",
+          "solver.reuse_below needs learned tangents; set solver.operator = \"quasi_newton\", or reuse_below = 0");
+  if (c.solver.reuse_below > 0 && volume_elements(c) && c.ve.answer == VeAnswer::mean)
+    m.add("solver.reuse_below",
+          "solver.reuse_below is for answers of a trial's end; set ve.answer = \"end\", or reuse_below = 0");
   if (c.solver.qn_min >= c.solver.qn_max) m.add("solver.qn_min", "solver.qn_min is not below qn_max; lower it");
 }
 
@@ -285,6 +291,7 @@ void check_monitor(const Monitor& monitor, const std::string& key, const std::se
 void check_monitors(const Case& c, const std::optional<std::set<std::string>>& edges,
                     const std::set<std::string>& regions, Mistakes& m) {
   std::set<std::string> names = {"step", "time", "load_factor", "iterations", "evaluations", "dem_steps", "residual"};
+  if (c.solver.reuse_below > 0) names.insert({"reused", "reuse_error"});
   for (std::size_t i = 0; i < c.monitors.size(); ++i) {
     const std::string key = fmt::format("monitor.{}", i);
     const std::string& name = c.monitors[i].name;

@@ -272,8 +272,15 @@ Section<SolverParameters> solver_section() {
        parameter("qn_skew", &S::qn_skew, "", kNotNegative, "learned tangent: norm of the skew part, elastic metric"),
        parameter(
            "qn_first", &S::qn_first, "", {0.0, 1.0},
-           "weight of what a step's first trial teaches against its start; default 0 for volume elements, else 1"),
+           "weight of what a step's first trial teaches against its start; default 0.5 for volume elements, else 1"),
+       parameter(
+           "qn_scatter", &S::qn_scatter, "", {0.0, 1.0},
+           "of a pair's stress about what its strain explains, over it; 0: every pair is met exactly; default 0.1 "
+           "for volume elements, else 0"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
+       parameter("reuse_below", &S::reuse_below, "", {0.0, 1.0},
+                 "a point that has moved by less of the step's strain since its last trial answers from its learned "
+                 "tangent; 0: none"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
                  "random start of one step / its displacement: finds other solutions"),
        parameter("start_time", &S::start_time, "s", kNotNegative, "the random start is that of the step past this"),

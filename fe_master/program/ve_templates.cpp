@@ -14,6 +14,7 @@
 
 #include "errors.hpp"
 #include "hash.hpp"
+#include "locations.hpp"
 #include "manifest.hpp"
 #include "output_folder.hpp"
 
@@ -29,7 +30,7 @@ std::string key_of(const VeParameters& ve, const std::string& specification, con
   for (const std::string& file : {ve.script, ve.scene}) {
     if (!file.empty()) key += read_file(file);
   }
-  return hash_text(key + makers(FEMXDEM_YADE_SCRIPTS));
+  return hash_text(key + makers(locations().yade_scripts));
 }
 
 std::map<std::string, std::string> parse_strings(const std::string& json) {

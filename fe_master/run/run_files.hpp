@@ -29,6 +29,7 @@ struct RunOptions {
   std::vector<std::string> remarks;   ///< for log.txt: the engine; what was adopted, dropped, reset
   std::shared_ptr<FolderLock> lock;   ///< of the folder where it is prepared already
   std::optional<Moment> ends_before;  ///< the process must have ended by then
+  std::optional<bool> progress;       ///< see Log
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 

@@ -39,6 +39,9 @@ class TimeLoop {
   bool told_to_end();
   std::string stopped();
   std::string place(std::size_t point) const;
+  bool reuses() const { return case_.solver.reuse_below > 0; }
+  std::vector<std::string> columns() const;
+  std::string reuse_account() const;
 
   Problem& problem_;
   const Case& case_;
@@ -54,6 +57,10 @@ class TimeLoop {
   StepSize size_;
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
+  struct Reuse {  // ReusedAnswers
+    long answers = 0;
+    double error = 0;  // largest that was accepted
+  } reuse_, reuse_of_step_;
   EndRequest end_request_;
   std::string end_reason_;              // why it is to end now
   Checkpoint state_;                    // of the last converged step, without that of the points
@@ -80,7 +87,7 @@ TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& o
           case_.control.end_time),
       end_request_(options.ends_before) {
   solver_.stop_when([this] { return told_to_end(); });
-  files_.begin_history(monitor_names(case_), resumed_.step);
+  files_.begin_history(columns(), resumed_.step);
   state_.case_hash = files_.summary.case_hash;
   state_.versions = options_.versions;
   state_.case_text = comparable_toml(case_);
@@ -107,11 +114,11 @@ int TimeLoop::go() {
     }
     const int status = advance();
     const double time = solver_.time();
-    const std::string message = status == kDone ? fmt::format("{} steps to time {:g}", files_.summary.steps, time)
-                                : status == kRunAgain
-                                    ? stopped()
-                                    : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
-                                                  files_.summary.steps, time, options_.folder.string(), last_.reason);
+    const std::string message =
+        status == kDone       ? fmt::format("{} steps to time {:g}{}", files_.summary.steps, time, reuse_account())
+        : status == kRunAgain ? stopped()
+                              : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
+                                            files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
     throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
@@ -150,6 +157,7 @@ void TimeLoop::step() {
 std::vector<IterationRecord> TimeLoop::note_attempt(const StepResult& result) {
   record_.evaluations += result.evaluations;
   record_.dem_steps += result.dem_steps;
+  reuse_of_step_.answers += result.reused;
   std::vector<IterationRecord> table;
   for (const Iteration& i : result.table) {
     record_.dem_seconds += i.engine_seconds;
@@ -190,6 +198,12 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_.residual = last_.table.back().residual;
   record_.wall_seconds = files_.wall();
   record_.monitors = monitor_values(case_, problem_.formulation(), now);
+  reuse_of_step_.error = last_.table.back().reuse_error;
+  if (reuses()) {
+    record_.monitors.push_back(static_cast<double>(reuse_of_step_.answers));
+    record_.monitors.push_back(reuse_of_step_.error);
+  }
+  reuse_ = {reuse_.answers + reuse_of_step_.answers, std::max(reuse_.error, reuse_of_step_.error)};
   files_.add(record_);
   files_.log.step(record_, table, done);
   if (last_.best_accepted)
@@ -197,11 +211,27 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
         fmt::format("step {} accepted above the tolerance: residual {:.1e}", record_.step, record_.residual));
   size_.accepted(last_.iterations() <= case_.control.max_iterations_to_grow);
   record_ = {};
+  reuse_of_step_ = {};
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   keep_state();
   if (checkpoint_due()) write_state();
   files_.whole(last_checkpoint_.value_or(0));
   whole_time_ = now.time;
+}
+
+/// Of history.csv, beside those of every run.
+std::vector<std::string> TimeLoop::columns() const {
+  std::vector<std::string> names = monitor_names(case_);
+  if (reuses()) names.insert(names.end(), {"reused", "reuse_error"});
+  return names;
+}
+
+/// What learned tangents have spared the points, and what it may have cost.
+std::string TimeLoop::reuse_account() const {
+  if (!reuses()) return "";
+  const double answers = static_cast<double>(files_.summary.evaluations) * static_cast<double>(points_.size());
+  return fmt::format("; {:.1f} % of the answers from learned tangents, their error at most {:.1e} of the forces",
+                     100 * static_cast<double>(reuse_.answers) / answers, reuse_.error);
 }
 
 std::string TimeLoop::place(std::size_t point) const {
@@ -224,6 +254,8 @@ void TimeLoop::keep_state() {
   control_.save(state_.arrays);
   state_.arrays.emplace_back(
       "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
+  if (reuses())
+    state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
 }
 
 void TimeLoop::write_state() {
@@ -281,6 +313,10 @@ void TimeLoop::restart() {
   files_.whole(resumed_.step);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
+  if (reuses()) {
+    const auto& reuse = find_array(resumed_.arrays, "run.reuse");
+    reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
+  }
   files_.log.start_from(resumed_.time / case_.control.end_time);
   files_.log.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
   resumed_ = {};

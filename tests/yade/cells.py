@@ -31,7 +31,8 @@ def packing(**changes):
 
 def users(source, path, **more):
     """Whole specification of a user's `script` or `scene`."""
-    return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **more}
+    limits = {"script_steps": 1_000_000, "script_seconds": 600.0}
+    return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **limits, **more}
 
 
 FRICTION = packing(contact_law="friction")
