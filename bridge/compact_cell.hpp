@@ -48,8 +48,6 @@ class CompactCell {
   static CompactCell load(std::string_view saved);
   /// The block with its checksum: load(save()) continues with equal bits, and save() of it gives equal bytes.
   std::string save() const;
-  /// The sentence why `saved` is not a state that load() takes, or nothing.
-  static std::optional<std::string> why_invalid(std::string_view saved);
 
   CompactCell(const CompactCell& other);
   CompactCell& operator=(const CompactCell& other);  ///< no allocation where the memory there suffices
@@ -71,6 +69,13 @@ class CompactCell {
   Deformed deform(const std::array<double, 9>& L, long steps, Sampling sampling);
   Deformed deform(const std::array<double, 9>& L, long steps) { return deform(L, steps, Sampling{}); }
 
+  /// All velocities become zero, those of the cell's deformation too, and with them the dashpots' forces.
+  void rest();
+  /// `steps` further steps of the last deform, without deformation: they count as its own. Why the cell cannot go on.
+  std::optional<std::string> hold(long steps);
+  /// Whether YADE has the law of its contacts, and so can repeat what it does.
+  bool law_of_yade() const;
+
   /// A cell that has become long becomes a shorter one of the same lattice, as in every step of deform: stress and
   /// contacts stay to round-off, so that shear of any size goes on. Whether it was too long.
   bool flip();
@@ -86,13 +91,13 @@ class CompactCell {
   /// All of kReportFields; "seconds" and "engine_seconds" are those of the last deform. Contacts that slide or adhere
   /// are of now.
   PointReport report() const;
-  /// The unbalanced force and the number of contacts alone, which decide whether an answer is good.
-  double unbalanced_force() const;
-  std::size_t contacts() const;
+  /// The rest of a report that trial_report has begun, of the same state; its costs are those of the last deform.
+  void complete(PointReport& report) const;
   /// Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised, (3, 3, 3, 3) [Pa]; relaxed: the same
   /// network with its grains in equilibrium.
   std::array<double, 81> stiffness(bool relaxed) const;
   VeInfo info() const;
+  double time_step() const;  ///< [s]
   /// The time step becomes what the contact network of now asks for, between load steps: within 1e-12 of what
   /// yade_scripts/time_step.py finds, which sums in another order. With ve.sorted_contacts YADE's cells take it from
   /// here.

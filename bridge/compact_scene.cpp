@@ -9,44 +9,24 @@
 
 #include "compact_step.hpp"
 #include "errors.hpp"
+#include "packet.hpp"
 
 namespace femxdem {
 namespace {
 
 constexpr std::string_view kMagic = "fxdscene";
-constexpr std::int64_t kVersion = 1;
+constexpr std::int64_t kVersion = 2;
+constexpr std::size_t kHeadWords = 53;  // before the spheres
 
-/// Numbers one after the other; the same sequence of calls reads a scene and writes it.
-class Reader {
- public:
-  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
-  template <class T, class Target>
-  void number(Target& target) {
-    if (at_ + sizeof(T) > bytes_.size()) throw UserError("export of a YADE scene: it is truncated; export it again");
-    T value;
-    std::memcpy(&value, bytes_.data() + at_, sizeof value);
-    at_ += sizeof value;
-    target = static_cast<Target>(value);
-  }
-  std::size_t left() const { return bytes_.size() - at_; }
-
- private:
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-class Writer {
- public:
-  template <class T, class Source>
-  void number(const Source& source) {
-    const T value = static_cast<T>(source);
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  std::string& bytes() { return bytes_; }
-
- private:
-  std::string bytes_{kMagic};
-};
+/// A number that is T in the export and anything here; the same sequence of calls reads a scene and writes it.
+template <class T, class Number>
+void number(PacketReader& reader, Number& target) {
+  target = static_cast<Number>(reader.get<T>());
+}
+template <class T, class Number>
+void number(PacketWriter& writer, const Number& source) {
+  writer.put(static_cast<T>(source));
+}
 
 /// A contact as the export has it.
 struct SceneContact {
@@ -62,12 +42,12 @@ struct SceneContact {
 /// The numbers of the header that the export has, in its order.
 template <class Stream, class Header>
 void header_numbers(Stream& s, Header& h) {
-  for (auto* number : {&h.time_step, &h.damping}) s.template number<double>(*number);
+  for (auto* scalar : {&h.time_step, &h.damping}) number<double>(s, *scalar);
   for (auto* tensor : {&h.H, &h.trsf, &h.L, &h.previous_L})
-    for (auto& number : *tensor) s.template number<double>(number);
-  for (auto* number : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
-                       &h.mean_diameter, &h.solid_volume})
-    s.template number<double>(*number);
+    for (auto& entry : *tensor) number<double>(s, entry);
+  for (auto* scalar : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
+                       &h.mean_diameter, &h.solid_volume, &h.viscous_damping})
+    number<double>(s, *scalar);
 }
 
 template <class Stream>
@@ -75,23 +55,23 @@ void sphere_numbers(Stream& s, const CompactArrays& a) {
   const std::size_t n = a.header->spheres;
   for (auto member : {&CompactSphere::x, &CompactSphere::v, &CompactSphere::w, &CompactSphere::f, &CompactSphere::t})
     for (std::size_t k = 0; k < n; ++k)
-      for (double& number : a.spheres[k].*member) s.template number<double>(number);
+      for (double& entry : a.spheres[k].*member) number<double>(s, entry);
   for (std::size_t k = 0; k < n; ++k)
-    for (double* part : a.turned) s.template number<double>(part[k]);
-  for (std::size_t k = 0; k < n; ++k) s.template number<double>(a.spheres[k].radius);
+    for (double* part : a.turned) number<double>(s, part[k]);
+  for (std::size_t k = 0; k < n; ++k) number<double>(s, a.spheres[k].radius);
   for (double* array : {a.mass, a.inertia, a.young, a.poisson, a.tangent})
-    for (std::size_t k = 0; k < n; ++k) s.template number<double>(array[k]);
+    for (std::size_t k = 0; k < n; ++k) number<double>(s, array[k]);
 }
 
 template <class Stream>
 void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
   for (auto& c : contacts)
-    for (auto& id : c.ids) s.template number<std::int64_t>(id);
+    for (auto& id : c.ids) number<std::int64_t>(s, id);
   for (auto& c : contacts)
-    for (auto& number : c.shift) s.template number<std::int64_t>(number);
-  for (auto& c : contacts) s.template number<std::int64_t>(c.waits);
+    for (auto& entry : c.shift) number<std::int64_t>(s, entry);
+  for (auto& c : contacts) number<std::int64_t>(s, c.waits);
   const auto each = [&](auto get) {
-    for (auto& c : contacts) s.template number<double>(get(c));
+    for (auto& c : contacts) number<double>(s, get(c));
   };
   each([](SceneContact& c) -> double& { return c.kn; });
   each([](SceneContact& c) -> double& { return c.ks; });
@@ -105,14 +85,15 @@ void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
   each([](SceneContact& c) -> double& { return c.normal_force; });
   for (auto member : {&SceneContact::shear, &SceneContact::normal})
     for (auto& c : contacts)
-      for (double& number : c.*member) s.template number<double>(number);
+      for (double& entry : c.*member) number<double>(s, entry);
 }
 
 /// The classes that the contacts and their future need, each once.
 class ClassTable {
  public:
   explicit ClassTable(const CompactHeader& header)
-      : cohesive_(header.law == CompactLaw::cohesive ? 1.0 : 0.0),
+      : cohesive_(header.law == CompactLaw::friction ? 0.0 : 1.0),
+        at_once_(header.law == CompactLaw::paper && !std::isnan(header.new_adhesion)),
         adhesion_(header.new_adhesion),
         friction_(header.new_friction) {}
 
@@ -129,8 +110,9 @@ class ClassTable {
     classes_[at].when_broken = broken;
     return at;
   }
-  /// Contacts that have just formed; if they become adhesive, they wait for it.
+  /// Contacts that have just formed; if they become adhesive, they wait for it, but not under the paper's law.
   std::uint32_t add_new(double tangent) {
+    if (at_once_) return add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0, 0, -1, 1, 0, 0});
     const std::uint32_t at = add({0, 0, 0, tangent, cohesive_, cohesive_, 0, -1, 1, 0, 0});
     if (!std::isnan(adhesion_) && classes_[at].when_aged < 0) {
       const std::uint32_t aged = add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0, 0, -1, 0, 0, 0});
@@ -142,7 +124,9 @@ class ClassTable {
 
  private:
   using Key = std::array<double, 7>;
-  double cohesive_, adhesion_, friction_;
+  double cohesive_;
+  bool at_once_;
+  double adhesion_, friction_;
   std::map<Key, std::uint32_t> places_;
   std::vector<CompactClass> classes_;
 };
@@ -166,6 +150,8 @@ void fill_contacts(const CompactArrays& a, const std::vector<SceneContact>& cont
     a.class_of[c] = class_of[c];
     a.header->new_contacts += a.classes[class_of[c]].when_aged >= 0;
     a.kn[c] = from.kn, a.ks[c] = from.ks, a.unp[c] = from.unp, a.normal_force[c] = from.normal_force;
+    const double adhesion = a.classes[class_of[c]].normal_adhesion;
+    if (a.header->law == CompactLaw::paper) a.unp[c] = adhesion > 0 ? adhesion / a.kn[c] : 0;
     for (std::size_t k = 0; k < 3; ++k) a.shear[k][c] = from.shear[k], a.normal[k][c] = from.normal[k];
   }
 }
@@ -176,18 +162,19 @@ struct Head {
   std::int64_t spheres = 0, contacts = 0;
 };
 
-Head read_head(Reader& reader) {
+Head read_head(PacketReader& reader) {
   Head head;
   std::int64_t version = 0, law = 0;
-  reader.number<std::int64_t>(version);
+  if (reader.left() < kHeadWords * 8) throw UserError("export of a YADE scene: it is truncated; export it again");
+  number<std::int64_t>(reader, version);
   if (version != kVersion) throw UserError("export of a YADE scene: it is of another version; export it again");
-  reader.number<std::int64_t>(law);
-  reader.number<std::int64_t>(head.spheres), reader.number<std::int64_t>(head.contacts);
-  reader.number<std::int64_t>(head.header.iteration), reader.number<std::int64_t>(head.header.start_vectors);
+  number<std::int64_t>(reader, law);
+  number<std::int64_t>(reader, head.spheres), number<std::int64_t>(reader, head.contacts);
+  number<std::int64_t>(reader, head.header.iteration), number<std::int64_t>(reader, head.header.start_vectors);
   header_numbers(reader, head.header);
   const auto n = static_cast<std::size_t>(head.spheres), m = static_cast<std::size_t>(head.contacts);
   const bool sizes = head.spheres >= 2 && head.contacts >= 0 && n < 1U << 28 && m < 1U << 28;
-  if (!sizes || law < 0 || law > 1 || head.header.start_vectors > 1 ||
+  if (!sizes || law < 0 || law > 2 || head.header.start_vectors > 1 ||
       reader.left() != 8 * (n * (25 + 6 * head.header.start_vectors) + m * 22))
     throw UserError("export of a YADE scene: its size is wrong; export it again");
   head.header.law = static_cast<CompactLaw>(law);
@@ -199,7 +186,7 @@ Head read_head(Reader& reader) {
 
 CompactBlock block_of_scene(std::string_view exported) {
   if (exported.substr(0, kMagic.size()) != kMagic) throw UserError("this is not the export of a YADE scene");
-  Reader reader(exported.substr(kMagic.size()));
+  PacketReader reader(exported.substr(kMagic.size()));
   Head head = read_head(reader);
   CompactBlock spheres(head.header);  // until the classes are known
   sphere_numbers(reader, spheres.arrays());
@@ -234,15 +221,16 @@ CompactBlock block_of_scene(std::string_view exported) {
                                  {s.turned[3], a.turned[3]}})
     std::copy_n(from, h.spheres, to);
   if (h.start_vectors)
-    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) reader.number<double>(a.start[k]);
+    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) number<double>(reader, a.start[k]);
   fill_contacts(a, contacts, class_of);
   make_list(block);
+  if (h.law == CompactLaw::paper) find_forces(block);
   return block;
 }
 
 bool same_state(std::string_view one, std::string_view other) {
   if (one.substr(0, kMagic.size()) != kMagic) throw UserError("this is not the export of a YADE scene");
-  Reader reader(one.substr(kMagic.size()));
+  PacketReader reader(one.substr(kMagic.size()));
   const Head head = read_head(reader);
   const auto n = static_cast<std::size_t>(head.spheres);
   const std::size_t turned = one.size() - reader.left() + 8 * 15 * n, end = turned + 8 * 4 * n;
@@ -261,11 +249,11 @@ bool same_state(std::string_view one, std::string_view other) {
 std::string scene_of_block(const CompactBlock& block) {
   const CompactArrays& a = block.arrays();
   const CompactHeader& h = *a.header;
-  Writer writer;
-  for (const std::int64_t number :
+  PacketWriter writer;
+  for (const std::int64_t count :
        {kVersion, static_cast<std::int64_t>(h.law), static_cast<std::int64_t>(h.spheres),
         static_cast<std::int64_t>(h.contacts), h.iteration, static_cast<std::int64_t>(h.start_vectors)})
-    writer.number<std::int64_t>(number);
+    number<std::int64_t>(writer, count);
   header_numbers(writer, h);
   sphere_numbers(writer, a);
   std::vector<SceneContact> contacts(h.contacts);
@@ -280,8 +268,8 @@ std::string scene_of_block(const CompactBlock& block) {
   }
   contact_numbers(writer, contacts);
   if (h.start_vectors)
-    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) writer.number<double>(a.start[k]);
-  return std::move(writer.bytes());
+    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) number<double>(writer, a.start[k]);
+  return std::string(kMagic) + writer.take();
 }
 
 }  // namespace femxdem

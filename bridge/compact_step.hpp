@@ -25,6 +25,11 @@ void make_list(CompactBlock& block);
 /// One DEM step from rest to rest: flip of the cell, integrator, cell, list, contacts. Throws what make_list throws.
 void step(CompactBlock& block);
 
+/// The contact forces of now, found again without a slip; contacts whose end has come are lost.
+void find_forces(CompactBlock& block);
+/// Spheres and cell stand still from now on, and so do the dashpots.
+void rest(CompactBlock& block);
+
 /// The class of contacts that form with that tangent of the friction angle.
 std::uint32_t class_of_new(const CompactArrays& arrays, double tangent);
 

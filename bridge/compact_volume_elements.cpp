@@ -18,9 +18,15 @@
 namespace femxdem {
 namespace {
 
-using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
+/// The stress at the end of a trial, which its report holds [Pa].
+Tensor2 end_stress(const PointReport& report) {
+  Tensor2 s;
+  s(0, 0) = report["end_stress_xx"], s(1, 1) = report["end_stress_yy"], s(2, 2) = report["end_stress_zz"];
+  s(0, 1) = s(1, 0) = report["end_stress_xy"];
+  s(1, 2) = s(2, 1) = report["end_stress_yz"];
+  s(2, 0) = s(0, 2) = report["end_stress_zx"];
+  return s;
+}
 
 /// A number in [0, 1) that the trial's number and the point decide (splitmix64, Steele, Lea, Flood 2014).
 double drawn(std::uint64_t trial) {
@@ -61,20 +67,20 @@ CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& 
                                   exported.bytes));
     point.cell = std::make_shared<CompactCell>(CompactCell::from_scene(exported.bytes));
     point.strained.origin = saved ? saved->origin : hash(scene);
-    if (!saved) referee_.add_origin(point.strained.origin, scene);
+    if (!saved && point.cell->law_of_yade()) referee_.add_origin(point.strained.origin, scene);
     const VeInfo info = point.cell->info();
     if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
     point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
   }
-  adopt(point);
+  adopt(point, tensor(point.cell->stress()));
   return point;
 }
 
-void CompactVolumeElements::adopt(Point& point) const {
+void CompactVolumeElements::adopt(Point& point, const Tensor2& stress) const {
   point.strained.stretch = tensor(point.cell->stretch());
-  point.strained.level = network_level(point.strained.stretch, tensor(point.cell->stress()));
+  point.strained.level = network_level(point.strained.stretch, stress);
   point.strained.frozen_steps = 0;
-  point.time_step = point.cell->info().time_step;
+  point.time_step = point.cell->time_step();
 }
 
 void CompactVolumeElements::add(const std::string& state, std::size_t count) {
@@ -211,11 +217,15 @@ void CompactVolumeElements::deform(Trial& trial) const {
   const CompactCell::Sampling sampling =
       answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
                              : CompactCell::Sampling{};
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
+  const long steps = trial.straining.steps;
+  if (options_.start_at_rest && steps > 0) cell.rest();
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, steps, sampling);
   trial.failure = end.failure;
+  if (!trial.failure && steps > 0) trial.failure = cell.hold(options_.hold_steps);
   if (trial.failure) return;
   trial.report = cell.trial_report();
-  trial.found = {tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
+  trial.found = {
+      answers_mean(options_) ? tensor(end.mean_stress) : end_stress(trial.report), tensor(cell.stretch()), {}};
 }
 
 void CompactVolumeElements::check(const Trial& trial) {
@@ -240,16 +250,19 @@ void CompactVolumeElements::check(const Trial& trial) {
 
 void CompactVolumeElements::commit() {
   if (size() == 0) return;
-  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
-  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  require_committable(trial_pending_, trial_failed_);
   std::vector<Point> ends(trials_.size());
   in_parallel(trials_.size(), [&](std::size_t t) {
     CompactCell& cell = *trials_[t].cell;
     Point& end = ends[t] = points_[trials_[t].first];
     end.cell = trials_[t].cell;
-    end.report = cell.report();
-    if (network_level(tensor(cell.stretch()), tensor(cell.stress())) != end.strained.level) cell.follow_network();
-    adopt(end);
+    end.report = trials_[t].report;
+    cell.complete(end.report);
+    const NetworkLevel before = end.strained.level;
+    adopt(end, end_stress(end.report));
+    if (end.strained.level == before) return;
+    cell.follow_network();
+    end.time_step = cell.time_step();
   });
   for (std::size_t p = 0; p < size(); ++p) {
     Point& end = ends[trial_of_point_[p]];

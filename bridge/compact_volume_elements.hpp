@@ -70,7 +70,7 @@ class CompactVolumeElements : public LocalPoints {
   };
 
   Point point_of(const std::string& state);
-  void adopt(Point& point) const;
+  void adopt(Point& point, const Tensor2& stress) const;
   Cell spare_cell();
   std::vector<std::size_t> longest_first() const;
   void group(const std::vector<Straining>& plans);

@@ -10,14 +10,6 @@
 #include "hash.hpp"
 
 namespace femxdem {
-namespace {
-
-using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
-
-}  // namespace
-
 PythonVolumeElements::PythonVolumeElements(WorkerProcess& worker, VolumeElementOptions options)
     : worker_(worker), options_(std::move(options)) {}
 
@@ -138,8 +130,7 @@ void PythonVolumeElements::read(std::size_t index, const Straining& straining, O
 
 void PythonVolumeElements::commit() {
   if (size() == 0) return;
-  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
-  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  require_committable(trial_pending_, trial_failed_);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
   const auto request = [&] {
     for (std::size_t i = 0; i < size(); ++i)

@@ -14,8 +14,8 @@ import unit_of_time
 
 LATER = 1 << 62  # a step number after the last look for new contacts, whenever that was
 MAGIC = b"fxdscene"
-VERSION = 1
-COHESIVE, FRICTION = 0, 1
+VERSION = 2
+COHESIVE, FRICTION, PAPER = 0, 1, 2
 LAWS = {
     ("ScGeom6D", "CohFrictPhys", "Law2_ScGeom6D_CohFrictPhys_CohesionMoment"): COHESIVE,
     ("ScGeom", "FrictPhys", "Law2_ScGeom_FrictPhys_CundallStrack"): FRICTION,
@@ -129,7 +129,7 @@ def _different(what, values):
 
 def export(O):
     """Everything of the scene, which covered(O) has found good, as bytes for compact_cell.CompactCell.from_scene."""
-    law = LAWS[_kind(O.engines[2])]
+    law = LAWS[_kind(O.engines[2])] if contact_laws.paper_law(O) is None else PAPER
     contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
     safety = contact_laws.time_step_safety(O)
     follows = safety is not None and contact_laws.constant_stiffness(O) is None
@@ -174,7 +174,7 @@ def _numbers(O, law, safety):
     scene_density = float(np.mean([b.mat.density for b in O.bodies]))
     diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
     solid = sum(b.state.mass for b in O.bodies) / scene_density
-    last = [safety, scene_density / unit**2, diameter, solid]
+    last = [safety, scene_density / unit**2, diameter, solid, contact_laws.paper_law(O) or 0.0]
     return np.concatenate([[O.dt / unit, newton.damping], *tensors, new, constants, last])
 
 
@@ -204,7 +204,7 @@ def _contact_arrays(O, law, contacts):
     shift = np.array([list(i.cellDist) for i in contacts], dtype=np.int64).reshape(m, 3)
     names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     cohesive = {name: np.zeros(m) for name in (*names, "fragile", "cohesionBroken")}
-    if law == COHESIVE:
+    if law != FRICTION:
         cohesive = {name: _scalars(phys, name) for name in cohesive}
     kn, normal = _scalars(phys, "kn"), _vectors(geom, "normal")
     overlap = _scalars(geom, "penetrationDepth")
@@ -254,7 +254,7 @@ class Scene:
         self.version, self.law, n, m, self.iteration, starts = (int(k) for k in self._take(6))
         self.time_step, self.damping = self._floats(2)
         self.H, self.trsf, self.L, self.previous_L = self._floats(36).reshape(4, 3, 3)
-        self.constants = self._floats(8)
+        self.constants = self._floats(9)
         for name, width in self.SPHERES.items():
             setattr(self, name, self._rows(n, width))
         self.ids, self.shift = self._take(2 * m).reshape(m, 2), self._take(3 * m).reshape(m, 3)
@@ -358,7 +358,7 @@ def _matched(O, scene):
 
 
 def _set_contacts(contacts, scene, what):
-    cohesive = scene.law == COHESIVE
+    cohesive = scene.law != FRICTION
     for at, i in enumerate(contacts):
         p = i.phys
         if what == "forces":

@@ -91,11 +91,13 @@ class Engine:
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
             contact_laws.to_forces(self.O)
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(self._scales(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(spheres=grains.count, mean_diameter=grains.mean_diameter, volume=self.O.cell.volume)
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
@@ -215,7 +217,7 @@ class Engine:
 
     def info(self, ve):
         self._select(ve)
-        return self._geometry(self._grains[ve])
+        return self._scales(self._grains[ve])
 
     def deform(self, ve, velocity_gradient, steps, sample_every=0, late=0.0, out_mean=None):
         self._select(ve)
@@ -333,17 +335,11 @@ class Engine:
             return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
 
-    def _geometry(self, grains):
+    def _scales(self, grains):
         """The numbers of protocol.py's info()."""
-        pressure = -np.trace(self._love_weber()) / 3
-        return {
-            "time_step": grains.unit.seconds(self.O.dt),
-            "time_scale": _time_scale(grains, pressure),
-            "volume": self.O.cell.volume,
-            "spheres": grains.count,
-            "mean_diameter": grains.mean_diameter,
-            "mean_stress": float(pressure),
-        }
+        pressure = float(-np.trace(self._love_weber()) / 3)
+        time_scale = _time_scale(grains, pressure)
+        return {"time_step": grains.unit.seconds(self.O.dt), "time_scale": time_scale, "mean_stress": pressure}
 
     def _equilibrium(self, grains):
         """What a trial is judged by."""

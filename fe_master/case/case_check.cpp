@@ -33,7 +33,6 @@ void refuse(Mistakes& m, const std::string& section, const Keys& keys, const std
 }
 
 // ---- mesh and regions
-// ------------------------------------------------------------------------------------------------
 
 void check_mesh_keys(const Case& c, Mistakes& m) {
   const Keys rectangle = {"width", "height", "nx", "ny"}, annulus = {"inner_radius", "outer_radius", "nr", "nt"};
@@ -136,7 +135,6 @@ std::set<std::string> check_regions(const Case& c, const std::optional<Mesh>& me
 }
 
 // ---- element, material, volume element
-// -------------------------------------------------------------------------------
 
 void check_element(const Case& c, Mistakes& m) {
   if (c.element.type == ElementType::axisymmetric)
@@ -176,6 +174,30 @@ void check_material(const Case& c, Mistakes& m) {
   }
 }
 
+/// The paper's law is one of compact cells, and of packings that are prepared for it.
+void check_paper_law(const VeParameters& ve, const std::string& key, Mistakes& m) {
+  if (ve.engine == EngineChoice::yade)
+    m.add(key + ".contact_law",
+          "ve.contact_law = \"paper\" is a law of compact cells, which YADE has not; set ve.engine = \"auto\" or "
+          "\"compact\", or contact_law = \"adhesive\"");
+  if (ve.source != VeSource::prepare)
+    m.add(
+        key + ".contact_law",
+        "ve.contact_law = \"paper\" needs ve.source = \"prepare\"; a script or a scene brings its own law, remove it");
+  if (ve.hold_steps > 0 && ve.answer == VeAnswer::mean)
+    m.add(key + ".hold_steps",
+          "ve.hold_steps > 0 has no mean that belongs to mid-step; set ve.answer = \"end\", or hold_steps = 0");
+}
+
+void check_other_law(const VeParameters& ve, const std::string& key, Mistakes& m) {
+  for (const auto& [name, used] : {std::pair{"viscous_damping", ve.viscous_damping > 0.0},
+                                   {"start_at_rest", ve.start_at_rest},
+                                   {"hold_steps", ve.hold_steps > 0}})
+    if (used)
+      m.add(fmt::format("{}.{}", key, name),
+            fmt::format("ve.{} is a switch of contact_law = \"paper\" alone; set that law, or remove {}", name, name));
+}
+
 void check_one_ve(const VeParameters& ve, const std::string& key, Mistakes& m) {
   if (ve.source == VeSource::scene && ve.scene.empty() && !m.has(key + ".scene"))
     m.add(key + ".source", "ve.source = \"scene\" needs a file; give ve.scene");
@@ -188,9 +210,16 @@ void check_one_ve(const VeParameters& ve, const std::string& key, Mistakes& m) {
   if (ve.contact_law == ContactLaw::friction && ve.cohesion > 0.0)
     m.add(key + ".cohesion",
           "ve.cohesion > 0 needs contact_law = \"adhesive\" or \"bonded\"; set one, or cohesion = 0");
-  if (ve.new_contacts == NewContacts::adhesive && (ve.contact_law != ContactLaw::adhesive || !(ve.cohesion > 0.0)))
+  const bool paper = ve.contact_law == ContactLaw::paper;
+  const bool adhesion = (paper || ve.contact_law == ContactLaw::adhesive) && ve.cohesion > 0.0;
+  if (ve.new_contacts == NewContacts::adhesive && !adhesion)
     m.add(key + ".new_contacts",
-          "ve.new_contacts = \"adhesive\" needs contact_law = \"adhesive\" and cohesion > 0; set both or remove it");
+          "ve.new_contacts = \"adhesive\" needs contact_law = \"adhesive\" or \"paper\", and cohesion > 0; set both or "
+          "remove it");
+  if (paper)
+    check_paper_law(ve, key, m);
+  else
+    check_other_law(ve, key, m);
 }
 
 void check_ve(const Case& c, Mistakes& m) {
@@ -209,7 +238,6 @@ void check_region_names(const std::vector<R>& regions, const std::string& sectio
 }
 
 // ---- control, solver, monitors
-// ---------------------------------------------------------------------------------------
 
 void check_control(const Case& c, Mistakes& m) {
   require(m, "control", {"end_time", "step"}, "s");
@@ -305,7 +333,6 @@ void check_monitors(const Case& c, const std::optional<std::set<std::string>>& e
 }
 
 // ---- path
-// ------------------------------------------------------------------------------------------------------------
 
 void check_segment(const PathSegment& s, const std::string& key, Mistakes& m) {
   const bool F = s.deformation_gradient.size() == 9;
@@ -373,8 +400,7 @@ const std::map<VePreset, PresetSettings> kPresets = {
 void complete_case(Case& c, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
-  if (!is_given(c.solver.tolerance)) c.solver.tolerance = ve ? 5e-3 : 1e-8;
-  if (!is_given(c.solver.displacement_tolerance)) c.solver.displacement_tolerance = ve ? 0.1 : 1e-6;
+  c.solver = with_default_tolerances(c.solver, ve);
   if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
   if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
   const auto complete_ve = [&](VeParameters& v, const auto& given) {

@@ -60,7 +60,6 @@ std::size_t write_file(const fs::path& file, const Checkpoint& checkpoint, Mater
   h5.set_attribute("/", "step", checkpoint.step);
   h5.set_attribute("/", "time", checkpoint.time);
   h5.set_attribute("/", "dt", checkpoint.dt);
-  h5.set_attribute("/", "case_hash", checkpoint.case_hash);
   h5.make_group("/versions");
   for (const auto& [name, version] : checkpoint.versions) h5.set_attribute("/versions", name, version);
   int order = 0;
@@ -69,7 +68,7 @@ std::size_t write_file(const fs::path& file, const Checkpoint& checkpoint, Mater
     h5.write(group + "/values", values, {values.size()});
     h5.set_attribute(group, "name", name);
   }
-  if (!checkpoint.case_text.empty()) h5.write_bytes("/case", checkpoint.case_text);
+  h5.write_bytes("/case", checkpoint.case_text);
   StateWriter states(h5, points.size());
   points.save_each(
       [&](const std::string& state, std::span<const std::size_t> of_points) { states.take(state, of_points); });
@@ -133,27 +132,6 @@ CheckpointFile::CheckpointFile(const fs::path& file) : file_(file) {
   h5_ = read_or_refuse([&] { return std::make_unique<Hdf5File>(file, Hdf5File::Mode::read); });
 }
 
-std::string CheckpointFile::case_hash() const {
-  return read_or_refuse([&] { return h5_->text("/", "case_hash"); });
-}
-
-std::string CheckpointFile::case_text() const {
-  return read_or_refuse([&] { return h5_->exists("/case") ? h5_->read_bytes("/case") : std::string(); });
-}
-
-double CheckpointFile::time() const {
-  return read_or_refuse([&] { return h5_->number("/", "time"); });
-}
-
-void CheckpointFile::refuse_other_case(const std::string& ours) const {
-  const std::string theirs = case_hash();
-  if (theirs == ours) return;
-  throw UserError(fmt::format(
-      "{}: belongs to another case (hash {}, this case has {}); restart with the case it was written by or choose "
-      "another --out",
-      file_.string(), theirs, ours));
-}
-
 void CheckpointFile::refuse_other_versions(const std::map<std::string, std::string>& versions) const {
   const std::vector<std::string> written_with = h5_->attributes("/versions");
   for (const auto& [name, version] : versions) {
@@ -167,17 +145,14 @@ void CheckpointFile::refuse_other_versions(const std::map<std::string, std::stri
   }
 }
 
-Checkpoint CheckpointFile::read(const std::string& case_hash,
-                                const std::map<std::string, std::string>& versions) const {
+Checkpoint CheckpointFile::read(const std::map<std::string, std::string>& versions) const {
   return read_or_refuse([&] {
-    refuse_other_case(case_hash);
     refuse_other_versions(versions);
     Checkpoint checkpoint;
     checkpoint.step = static_cast<int>(h5_->number("/", "step"));
     checkpoint.time = h5_->number("/", "time");
     checkpoint.dt = h5_->number("/", "dt");
-    checkpoint.case_hash = case_hash;
-    checkpoint.case_text = case_text();
+    checkpoint.case_text = h5_->read_bytes("/case");
     for (const std::string& name : h5_->attributes("/versions"))
       checkpoint.versions[name] = h5_->text("/versions", name);
     for (const std::string& order : h5_->members("/arrays")) {

@@ -14,13 +14,12 @@ namespace femxdem {
 
 /// Everything but the states of the points that a run needs to go on from a converged step as if it had never stopped.
 struct Checkpoint {
-  int step = 0;        ///< the last converged step
-  double time = 0;     ///< [s]
-  double dt = 0;       ///< time increment that the next step would have tried [s]
-  NamedArrays arrays;  ///< master's committed state, in order, names unique
-  std::string case_hash;
+  int step = 0;                                 ///< the last converged step
+  double time = 0;                              ///< [s]
+  double dt = 0;                                ///< time increment that the next step would have tried [s]
+  NamedArrays arrays;                           ///< master's committed state, in order, names unique
+  std::string case_text;                        ///< comparable_toml of the case
   std::map<std::string, std::string> versions;  ///< such as {"yade", "2023.02a"}; the states are readable by these only
-  std::string case_text = {};                   ///< comparable_toml of the case, for saying what differs
 };
 
 /// What a checkpoint takes.
@@ -45,21 +44,15 @@ class CheckpointFile {
   /// before it, if that is whole.
   explicit CheckpointFile(const std::filesystem::path& file);
 
-  const std::filesystem::path& file() const { return file_; }
-  std::string case_hash() const;
-  std::string case_text() const;
-  double time() const;
-
-  /// All but the states, bit-equal. Refuses a checkpoint of another case, or of other versions than `versions` (of the
-  /// names that both have).
-  Checkpoint read(const std::string& case_hash, const std::map<std::string, std::string>& versions) const;
+  /// All but the states, bit-equal. Refuses a checkpoint of other versions than `versions` (of the names that both
+  /// have).
+  Checkpoint read(const std::map<std::string, std::string>& versions) const;
   /// Reads from this file.
   StateSource states() const;
 
  private:
   template <class Read>
   auto read_or_refuse(Read read) const;
-  void refuse_other_case(const std::string& case_hash) const;
   void refuse_other_versions(const std::map<std::string, std::string>& versions) const;
 
   std::filesystem::path file_;

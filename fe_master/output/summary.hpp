@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 
 namespace femxdem {
 
@@ -37,6 +38,9 @@ struct Summary {
 /// seconds of evaluate), `engine_share` = engine seconds / (the same), `overhead_ratio` = 1 - engine_share; null where
 /// unknown.
 std::string to_json(const Summary& summary, const std::string& date, const std::string& host);
+
+/// A text between quotes as JSON and TOML want it.
+std::string quoted_text(std::string_view text);
 
 /// Writes it with the date (UTC, ISO 8601) and the name of this machine.
 void write_summary(const std::filesystem::path& file, const Summary& summary);

@@ -1,26 +1,11 @@
 #include "material_points.hpp"
 
-#include <algorithm>
-#include <stdexcept>
 #include <string_view>
 #include <unordered_map>
 
 #include "errors.hpp"
 
 namespace femxdem {
-namespace {
-
-std::size_t report_index(std::string_view field) {
-  const auto found = std::find(kReportFields.begin(), kReportFields.end(), field);
-  if (found == kReportFields.end()) throw std::out_of_range("no report field named " + std::string(field));
-  return static_cast<std::size_t>(found - kReportFields.begin());
-}
-
-}  // namespace
-
-double& PointReport::operator[](std::string_view field) { return values[report_index(field)]; }
-
-double PointReport::operator[](std::string_view field) const { return values[report_index(field)]; }
 
 std::vector<std::pair<int, std::vector<std::size_t>>> StateSource::points_of_states() const {
   std::vector<std::pair<int, std::vector<std::size_t>>> shares;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -40,11 +41,18 @@ inline constexpr std::array<std::string_view, 26> kReportFields = {
 };
 // clang-format on
 
+/// Place of a field in a report; throws std::out_of_range on an unknown one.
+constexpr std::size_t report_index(std::string_view field) {
+  for (std::size_t k = 0; k < kReportFields.size(); ++k)
+    if (kReportFields[k] == field) return k;
+  throw std::out_of_range("no report field named " + std::string(field));
+}
+
 struct PointReport {
   /// In the order of kReportFields; 0 where a law has no such quantity.
   std::array<double, kReportFields.size()> values{};
-  double& operator[](std::string_view field);  ///< throws std::out_of_range on an unknown field
-  double operator[](std::string_view field) const;
+  double& operator[](std::string_view field) { return values[report_index(field)]; }
+  double operator[](std::string_view field) const { return values[report_index(field)]; }
 };
 
 /// Failure of a material point: a value, never an exit.

@@ -161,6 +161,8 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   options.inertial_number = ve.inertial_number;
   options.min_steps = ve.min_steps;
   options.answer_at = answer_at(ve);
+  options.start_at_rest = ve.start_at_rest;
+  options.hold_steps = ve.hold_steps;
   options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
   options.relaxed = ve.stiffness == VeStiffness::relaxed;

@@ -10,8 +10,8 @@
 #include "checkpoint.hpp"
 #include "end_request.hpp"
 #include "errors.hpp"
-#include "nonlinear_solver.hpp"
 #include "path_driver.hpp"
+#include "problem.hpp"
 #include "restart.hpp"
 #include "step_size.hpp"
 
@@ -50,13 +50,6 @@ std::vector<double> values(const Tensor2& F, const Response& response) {
   return row;
 }
 
-SolverParameters parameters_of(const Case& c) {
-  const bool on_volume_element = c.material.type == MaterialType::volume_element;
-  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_element);
-  if (on_volume_element) parameters.answer_at = answer_at(c.ve);
-  return parameters;
-}
-
 /// The steps along the segments and the files that they fill.
 class Path {
  public:
@@ -92,13 +85,15 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
       point_(point),
       options_(options),
       noise_samples_(noise_samples),
-      parameters_(parameters_of(c)),
+      parameters_(solver_parameters(c)),
       driver_(point, parameters_),
       files_(c, options),
       end_request_(options.ends_before) {
   if (options.existing == Existing::resume) {
-    const CheckpointFile file(options.folder / "checkpoint.h5");
-    resumed_ = file.read(hash_of_restart(file, c), options.versions);
+    const std::filesystem::path place = options.folder / "checkpoint.h5";
+    const CheckpointFile file(place);
+    resumed_ = file.read(options.versions);
+    refuse_other_case(place, *resumed_, c);
     point.load_each(file.states());
   }
   files_.begin_history(columns(noise_samples > 0), resumed_ ? resumed_->step : 0);
@@ -154,8 +149,8 @@ bool Path::told_to_end() {
 
 /// time: the number of the segment.
 void Path::save(std::size_t segment, double done, double size) {
-  Checkpoint checkpoint{files_.summary.steps, static_cast<double>(segment), size, {}, files_.summary.case_hash,
-                        options_.versions,    comparable_toml(case_)};
+  Checkpoint checkpoint{files_.summary.steps, static_cast<double>(segment), size, {}, comparable_toml(case_),
+                        options_.versions};
   driver_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back("path.done", std::vector<double>{done});
   checkpoint.arrays.emplace_back(

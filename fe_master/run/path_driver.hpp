@@ -49,7 +49,7 @@ struct PathStep {
 /// NonlinearSolver says.
 class PathDriver {
  public:
-  /// point.size() is 1. Tolerances must be given, see with_default_tolerances.
+  /// point.size() is 1. Tolerances must be given, see solver_parameters.
   /// Throws UserError when the undeformed point fails.
   PathDriver(MaterialPoints& point, const SolverParameters& parameters);
 

@@ -50,9 +50,13 @@ class RunFiles {
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   /// What a full disk leaves: how the run ended, if it still finds a place. Returns the sentence.
-  std::string stopped_by_the_disk(const std::string& reason, double time);
-  /// Every file has what it should of the last step; last_checkpoint: the step of the one on the disk, 0: none.
-  void whole(int last_checkpoint);
+  std::string stopped_by_the_disk(const std::string& reason);
+  /// Every file has what it should of the last step, which ended at `time`.
+  void whole(double time);
+  /// There is a checkpoint of the last step on the disk.
+  void checkpoint_written() { last_checkpoint_ = summary.steps; }
+  /// Its step; nothing where there is none.
+  std::optional<int> last_checkpoint() const { return last_checkpoint_; }
 
  private:
   std::shared_ptr<FolderLock> lock_;  // before any file in the folder
@@ -65,7 +69,9 @@ class RunFiles {
   const RunOptions& options_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::optional<History> history_;
-  int whole_step_ = 0, last_checkpoint_ = 0;
+  int whole_step_ = 0;
+  std::optional<int> last_checkpoint_;
+  double whole_time_ = 0;
 };
 
 }  // namespace femxdem

@@ -62,12 +62,10 @@ class TimeLoop {
     double error = 0;  // largest that was accepted
   } reuse_, reuse_of_step_;
   EndRequest end_request_;
-  std::string end_reason_;              // why it is to end now
-  Checkpoint state_;                    // of the last converged step, without that of the points
-  std::optional<int> last_checkpoint_;  // step of the one on the disk
+  std::string end_reason_;  // why it is to end now
+  Checkpoint state_;        // of the last converged step, without that of the points
   Moment last_saved_ = Moment::clock::now();
   double checkpoint_seconds_ = 0, longest_evaluation_ = 0;  // wall time
-  double whole_time_ = 0;                                   // of the last step of which every file has what it should
 };
 
 TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed,
@@ -88,7 +86,6 @@ TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& o
       end_request_(options.ends_before) {
   solver_.stop_when([this] { return told_to_end(); });
   files_.begin_history(columns(), resumed_.step);
-  state_.case_hash = files_.summary.case_hash;
   state_.versions = options_.versions;
   state_.case_text = comparable_toml(case_);
 }
@@ -121,7 +118,7 @@ int TimeLoop::go() {
                                             files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
-    throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
+    throw DiskError(files_.stopped_by_the_disk(error.what()));
   } catch (const std::exception& error) {
     files_.finish(kPointFailed, error.what());
     throw;
@@ -215,8 +212,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   keep_state();
   if (checkpoint_due()) write_state();
-  files_.whole(last_checkpoint_.value_or(0));
-  whole_time_ = now.time;
+  files_.whole(now.time);
 }
 
 /// Of history.csv, beside those of every run.
@@ -261,7 +257,7 @@ void TimeLoop::keep_state() {
 void TimeLoop::write_state() {
   const auto start = Moment::clock::now();
   const CheckpointSize size = write_checkpoint(options_.folder / "checkpoint.h5", state_, points_);
-  last_checkpoint_ = state_.step;
+  files_.checkpoint_written();
   last_saved_ = Moment::clock::now();
   checkpoint_seconds_ = std::chrono::duration<double>(last_saved_ - start).count();
   const double points = static_cast<double>(points_.size()), bytes = static_cast<double>(size.bytes);
@@ -295,7 +291,7 @@ bool TimeLoop::told_to_end() {
 
 /// Saves, unless it is saved already; the sentence about it.
 std::string TimeLoop::stopped() {
-  if (last_checkpoint_ != state_.step) write_state();
+  if (files_.last_checkpoint() != state_.step) write_state();
   return fmt::format("{}: stopped and saved after step {} (time {:g}) in {}; run again with --restart", end_reason_,
                      state_.step, solver_.time(), options_.folder.string());
 }
@@ -308,9 +304,8 @@ void TimeLoop::restart() {
   before_ = solver_.committed();
   size_.set_size(resumed_.dt);
   files_.summary.steps = resumed_.step;
-  last_checkpoint_ = resumed_.step;
-  whole_time_ = resumed_.time;
-  files_.whole(resumed_.step);
+  files_.checkpoint_written();
+  files_.whole(resumed_.time);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
   if (reuses()) {
@@ -331,8 +326,10 @@ int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options
   Checkpoint resumed;
   std::unique_ptr<CheckpointFile> file;
   if (options.existing == Existing::resume) {
-    file = std::make_unique<CheckpointFile>(options.folder / "checkpoint.h5");
-    resumed = file->read(hash_of_restart(*file, problem.parameters()), options.versions);
+    const std::filesystem::path place = options.folder / "checkpoint.h5";
+    file = std::make_unique<CheckpointFile>(place);
+    resumed = file->read(options.versions);
+    refuse_other_case(place, resumed, problem.parameters());
   }
   std::optional<TimeLoop> loop;
   try {

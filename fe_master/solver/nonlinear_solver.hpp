@@ -152,8 +152,4 @@ class NonlinearSolver {
   std::function<bool()> told_to_end_ = [] { return false; };
 };
 
-/// The tolerances of a case, or the defaults where it gives none: 5e-3 (force) and 0.1 (displacement) for volume
-/// elements, whose noise allows no less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
-SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements);
-
 }  // namespace femxdem

@@ -15,7 +15,8 @@ constexpr int kNoMore = -1;
 
 WorkerCommand dummy() {
   WorkerCommand command;
-  command.engine = "protocol:DummyEngine";
+  command.engine = "dummy_engine:DummyEngine";
+  command.python_path = TEST_ENGINES;
   return command;
 }
 

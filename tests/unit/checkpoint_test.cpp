@@ -52,7 +52,7 @@ Checkpoint sample(int step = 17) {
       1.0 / 3.0,
       1e-3 / 7.0,
       {{"zeta", {1.0 / 3.0, -0.0, std::numeric_limits<double>::denorm_min(), 1e308}}, {"alpha/beta", {}}, {"u", {2}}},
-      "1f2e",
+      "[mesh]\n",
       {{"yade", "2023.02a"}, {"boost", "1.74"}}};
 }
 
@@ -64,14 +64,13 @@ class CheckpointTest : public OwnFolder {
     StatesOnly points(sample_states());
     write_checkpoint(file(), sample(step), points);
   }
-  int step_on_disk() const { return CheckpointFile(file()).read("1f2e", {}).step; }
+  int step_on_disk() const { return CheckpointFile(file()).read({}).step; }
   /// Why it is refused; "accepted" else.
-  std::string sentence(const std::string& hash = "1f2e",
-                       const std::map<std::string, std::string>& versions = {}) const {
+  std::string sentence(const std::map<std::string, std::string>& versions = {}) const {
     try {
       StatesOnly points(SavedStates(4));
       const CheckpointFile checkpoint(file());
-      checkpoint.read(hash, versions);
+      checkpoint.read(versions);
       points.load_each(checkpoint.states());
     } catch (const UserError& error) {
       return error.what();
@@ -93,11 +92,12 @@ TEST_F(CheckpointTest, IsReadBackToTheLastBit) {
   write();
   const Checkpoint written = sample();
   const CheckpointFile checkpoint(file());
-  const Checkpoint read = checkpoint.read("1f2e", written.versions);
+  const Checkpoint read = checkpoint.read(written.versions);
   EXPECT_EQ(read.step, 17);
   EXPECT_EQ(read.time, written.time);
   EXPECT_EQ(read.dt, written.dt);
   EXPECT_EQ(read.versions, written.versions);
+  EXPECT_EQ(read.case_text, written.case_text);
   StatesOnly points(SavedStates(4));
   points.load_each(checkpoint.states());
   EXPECT_EQ(points.states(), sample_states());
@@ -133,24 +133,17 @@ TEST_F(CheckpointTest, AWriteThatFailsLeavesTheOldOne) {
 TEST_F(CheckpointTest, TheOneBeforeIsKept) {
   for (const int step : {17, 18, 19}) write(step);
   EXPECT_EQ(step_on_disk(), 19);
-  EXPECT_EQ(CheckpointFile(folder_ / "checkpoint.previous.h5").read("1f2e", {}).step, 18);
+  EXPECT_EQ(CheckpointFile(folder_ / "checkpoint.previous.h5").read({}).step, 18);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 2);
-}
-
-TEST_F(CheckpointTest, AnotherCaseIsRefused) {
-  write();
-  EXPECT_EQ(sentence("0000"), file().string() +
-                                  ": belongs to another case (hash 1f2e, this case has 0000); restart with the "
-                                  "case it was written by or choose another --out");
 }
 
 TEST_F(CheckpointTest, AnotherVersionIsRefused) {
   write();
-  EXPECT_EQ(sentence("1f2e", {{"yade", "2024.1"}}),
+  EXPECT_EQ(sentence({{"yade", "2024.1"}}),
             file().string() +
                 ": written with yade 2023.02a, this program has 2024.1: states cannot be read across versions; use the "
                 "version it was written with or start without --restart");
-  EXPECT_EQ(sentence("1f2e", {{"yade", "2023.02a"}, {"python", "3.11"}}), "accepted");
+  EXPECT_EQ(sentence({{"yade", "2023.02a"}, {"python", "3.11"}}), "accepted");
 }
 
 TEST_F(CheckpointTest, AMissingOrForeignFileIsRefused) {

@@ -17,7 +17,7 @@ SPHERES = 60
 PACKING = {
     "source": "prepare", "spheres": SPHERES, "size_ratio": 1.5, "kappa": 500.0, "stiffness_ratio": 1.0, "friction": 0.5,
     "compaction_friction": 0.0, "cohesion": 0.0, "contact_law": "adhesive", "new_contacts": "frictional", "confining_stress": 1e5,
-    "mean_diameter": 1e-3, "density": 2600.0, "damping": 0.2, "seed": 1, "time_step_safety": 0.8
+    "mean_diameter": 1e-3, "density": 2600.0, "damping": 0.2, "seed": 1, "time_step_safety": 0.8, "viscous_damping": 0.0
 }  # fmt: skip
 
 
