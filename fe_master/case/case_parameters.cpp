@@ -153,8 +153,11 @@ std::vector<Parameter<VeParameters>> packing_parameters() {
           parameter("stiffness_ratio", &V::stiffness_ratio, "", kPositive, "k_n / k_t"),
           parameter("friction", &V::friction, "", {0.0, 10.0}, "mu, inter-granular"),
           parameter("cohesion", &V::cohesion, "", kNotNegative, "p* = f_c / (sigma_0 a^2)"),
-          word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction"},
-               "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none"),
+          word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction", "paper"},
+               "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none; paper: f_n = "
+               "k_n delta - f_c, |f_t| <= mu k_n delta, in compact cells alone: README of validation/contact_laws"),
+          parameter("viscous_damping", &V::viscous_damping, "", {0.0, 2.0},
+                    "paper: dashpot of a contact's normal / the critical one"),
           word("new_contacts", &V::new_contacts, {"frictional", "adhesive"},
                "contacts that form after the preparation: without adhesion, or adhesive as the others"),
           parameter("compaction_friction", &V::compaction_friction, "", {0.0, 10.0},

@@ -112,7 +112,7 @@ class Program(unittest.TestCase):
             self.assertEqual(history(out), self.reference)
 
     def test_both_engines_have_the_same_history(self):
-        out, status, said = run("yade", *YADE, *IN_ORDER)
+        out, status, said = run("in_yade", *YADE, *IN_ORDER)
         self.assertEqual(status, 0, said)
         self.assertEqual(engine(out), "yade")
         self.assertEqual(history(out), self.reference)
