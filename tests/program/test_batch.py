@@ -51,7 +51,8 @@ class TwoJobs(unittest.TestCase):
 
 
 class ToldToEnd(unittest.TestCase):
-    STEPS = ["--set", "control.step=4e-3", "--set", "control.max_step=4e-3", "--set", "output.checkpoint_every=0"]
+    STEPS = ["--set", "control.end_time=0.24", "--set", "control.step=4e-3", "--set", "control.max_step=4e-3",
+             "--set", "output.checkpoint_every=0"]
 
     def start(self, *arguments):
         return subprocess.Popen([str(FEMXDEM), "run", str(LAW), *self.STEPS, *arguments], cwd=FOLDER,
