@@ -306,28 +306,21 @@ std::string CompactVolumeElements::save_one(std::size_t index) {
   return encode({EngineKind::compact, point.strained.reference_time_scale, point.strained.origin, point.cell->save()});
 }
 
-SavedStates CompactVolumeElements::save() {
-  SavedStates states;
-  std::map<const CompactCell*, std::string> known;
-  for (std::size_t p = 0; p < size(); ++p) {
-    std::string& state = known[points_[p].cell.get()];
-    if (state.empty()) state = save_one(p);
-    states.push_back(state);
-  }
-  return states;
+void CompactVolumeElements::save_each(const TakeState& take) {
+  StateSource cells;  // points of one cell have one state
+  std::map<const CompactCell*, int> number_of;
+  for (const Point& point : points_)
+    cells.number_of_point.push_back(
+        number_of.emplace(point.cell.get(), static_cast<int>(number_of.size())).first->second);
+  for (const auto& [cell, points] : cells.points_of_states()) take(save_one(points.front()), points);
 }
 
-void CompactVolumeElements::load(const SavedStates& states) {
-  require_as_many(states.size(), size());
-  std::map<std::string_view, Point> known;  // equal states are one cell
-  std::vector<Point> loaded;
-  for (std::size_t p = 0; p < size(); ++p) {
-    auto entry = known.find(states[p]);
-    if (entry == known.end()) entry = known.emplace(states[p], point_of(states[p])).first;
-    require_origin(entry->second.strained.origin, points_[p].strained.origin);
-    loaded.push_back(entry->second);
+void CompactVolumeElements::load_into(std::span<const std::size_t> points, const std::string& state) {
+  const Point loaded = point_of(state);
+  for (const std::size_t p : points) {
+    require_origin(loaded.strained.origin, points_.at(p).strained.origin);
+    points_[p] = loaded;
   }
-  points_ = std::move(loaded);
   trials_.clear();
   trial_pending_ = false;
 }

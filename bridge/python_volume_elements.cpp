@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <stdexcept>
 
@@ -188,28 +189,23 @@ std::vector<PointReport> PythonVolumeElements::reports() const {
   return reports;
 }
 
-SavedStates PythonVolumeElements::save() {
+void PythonVolumeElements::save_each(const TakeState& take) {
   drop_trial();
-  SavedStates states;
-  for (std::size_t i = 0; i < size(); ++i) {
-    states.push_back(save_one(i));
-  }
+  for (std::size_t i = 0; i < size(); ++i) take(save_one(i), std::array{i});
   begin_step();
-  return states;
 }
 
-void PythonVolumeElements::load(const SavedStates& states) {
-  require_as_many(states.size(), size());
+void PythonVolumeElements::load_into(std::span<const std::size_t> points, const std::string& state) {
   drop_trial();
-  for (std::size_t i = 0; i < size(); ++i) {
-    const StrainedPoint& point = points_[i];
-    const VeState state =
-        decode(states[i]).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, states[i]});
-    const bool compact = state.engine == EngineKind::compact;
-    if (compact) require_origin(state.origin, point.origin);
+  for (const std::size_t i : points) {
+    const StrainedPoint& point = points_.at(i);
+    const VeState saved =
+        decode(state).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, state});
+    const bool compact = saved.engine == EngineKind::compact;
+    if (compact) require_origin(saved.origin, point.origin);
     worker_.request(compact ? Command::write_back : Command::load, static_cast<std::int64_t>(i), 0,
-                    compact ? CompactCell::load(state.bytes).to_scene() : state.bytes);
-    points_[i].reference_time_scale = state.reference_time_scale;
+                    compact ? CompactCell::load(saved.bytes).to_scene() : saved.bytes);
+    points_[i].reference_time_scale = saved.reference_time_scale;
     adopt_state(i);
   }
   begin_step();

@@ -46,8 +46,8 @@ class PythonVolumeElements : public LocalPoints {
   /// Throws std::logic_error without a trial or after a trial that failed.
   void commit() override;
   std::vector<PointReport> reports() const override;
-  SavedStates save() override;
-  void load(const SavedStates& states) override;
+  void save_each(const TakeState& take) override;
+  void load_into(std::span<const std::size_t> points, const std::string& state) override;
 
  private:
   Straining plan(std::size_t index, const Tensor2& F);

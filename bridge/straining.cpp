@@ -113,9 +113,4 @@ void require_committable(bool trial_pending, bool trial_failed) {
   if (trial_failed) throw std::logic_error("commit: a volume element failed in this trial");
 }
 
-void require_as_many(std::size_t states, std::size_t points) {
-  if (states != points)
-    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states, points));
-}
-
 }  // namespace femxdem

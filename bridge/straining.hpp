@@ -93,8 +93,6 @@ void require_time_scale(double time_scale, double time_step, double mean_stress)
 void require_answerable(Operator wanted, std::size_t gradients, std::size_t points);
 /// Throws std::logic_error where there is no trial, or one that failed.
 void require_committable(bool trial_pending, bool trial_failed);
-/// Throws UserError for another number of saved states than points.
-void require_as_many(std::size_t states, std::size_t points);
 
 inline constexpr const char* kSmallerStep = "Try a smaller load step.";
 

@@ -12,6 +12,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "end_signals.hpp"
 #include "mailbox.hpp"
 
 namespace femxdem {
@@ -309,12 +310,12 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const auto rank = static_cast<pid_t>(std::stol(argv[3]));
   die_with(rank);
-  std::signal(SIGINT, SIG_IGN);  // the rank decides
   Message ready;
   try {
     Batch& batch = *static_cast<Batch*>(map_shared(kBatchDescriptor, sizeof(Batch)));
     Engine engine(argv[1], argv[2]);
-    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGTERM}) std::signal(signal, SIG_DFL);
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL}) std::signal(signal, SIG_DFL);
+    ignore_end_signals();  // importing YADE has handled some
     reply(ready, ReplyKind::done, getpid());
     Worker(engine, batch, rank).serve();
     engine.flush();

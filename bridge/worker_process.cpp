@@ -19,6 +19,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "end_signals.hpp"
 #include "errors.hpp"
 #include "locations.hpp"
 #include "mailbox.hpp"
@@ -121,6 +122,7 @@ void WorkerProcess::start() {
   if (pid_ < 0) throw system_error("worker: cannot be started");
   if (pid_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ignore_end_signals();
     if (const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC); nothing >= 0) dup2(nothing, STDIN_FILENO);
     place_descriptors({ends[1], batch_descriptor_, mail_descriptor_});
     execve(argv[0], argv.data(), envp.data());

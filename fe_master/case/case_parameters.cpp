@@ -307,12 +307,13 @@ Section<SolverParameters> solver_section() {
 
 Section<OutputParameters> output_section() {
   using O = OutputParameters;
-  return {
-      "output",
-      "files of a run",
-      {parameter("directory", &O::directory, "", kAny, "folder of the results; --out comes before it"),
-       parameter("every", &O::every, "", kAtLeastOne, "steps between field outputs"),
-       parameter("checkpoint_every", &O::checkpoint_every, "", kNotNegative, "steps between checkpoints; 0: none")}};
+  return {"output",
+          "files of a run",
+          {parameter("directory", &O::directory, "", kAny, "folder of the results; --out comes before it"),
+           parameter("every", &O::every, "", kAtLeastOne, "steps between field outputs"),
+           parameter("checkpoint_every", &O::checkpoint_every, "", kNotNegative, "steps between checkpoints; 0: none"),
+           parameter("checkpoint_minutes", &O::checkpoint_minutes, "min", kNotNegative,
+                     "wall time after which a step is followed by a checkpoint; 0: none")}};
 }
 
 Section<Monitor> monitor_section() {

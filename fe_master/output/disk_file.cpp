@@ -110,6 +110,19 @@ void reserve_space(const fs::path& file, std::uint64_t bytes) {
   if (reason != 0) fail(file, reason);
 }
 
+void keep_as(const fs::path& file, const fs::path& other) {
+  if (!fs::exists(file)) return;
+  const std::string link_name = other.string() + ".new";
+  unlink(link_name.c_str());
+  if (link(file.c_str(), link_name.c_str()) != 0) {
+    if (rename(file.c_str(), other.c_str()) != 0) fail(other, errno);
+    return;
+  }
+  const int reason = rename(link_name.c_str(), other.c_str()) == 0 ? 0 : errno;
+  unlink(link_name.c_str());  // rename leaves it where both are one file already
+  if (reason != 0) fail(other, reason);
+}
+
 void put_in_place(const fs::path& beside, const fs::path& file) {
   const int descriptor = open(beside.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) fail(beside, errno);

@@ -34,6 +34,10 @@ void replace_file(const std::filesystem::path& file, std::string_view text);
 /// Makes sure that `file`, which exists, can grow by so many bytes: for libraries that do not survive a full disk.
 void reserve_space(const std::filesystem::path& file, std::uint64_t bytes);
 
+/// `file` as it is now is called `other` as well, in place of what was called so; there is always a `file` (but for an
+/// instant where the file system has no hard links). Nothing where there is no `file`.
+void keep_as(const std::filesystem::path& file, const std::filesystem::path& other);
+
 /// Puts `beside` in the place of `file`, once its bytes are on the disk.
 void put_in_place(const std::filesystem::path& beside, const std::filesystem::path& file);
 

@@ -6,7 +6,6 @@
 
 #include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -81,14 +80,8 @@ bool create(const fs::path& file, const Owner& owner) {
   throw DiskError(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(reason)));
 }
 
-/// The lock of this process, for the handler of signals: it may only call what is safe there.
+/// The lock of this process, for a handler of signals: it may only call what is safe there.
 std::array<char, 4096> held_file{};
-
-void let_go_and_die(int number) {
-  if (held_file[0] != '\0') unlink(held_file.data());
-  std::signal(number, SIG_DFL);
-  raise(number);
-}
 
 }  // namespace
 
@@ -116,14 +109,16 @@ FolderLock::FolderLock(const fs::path& folder) : file_(fs::absolute(folder) / "r
     if (!moved) fs::remove(mine, moved);
   }
   if (file_.string().size() < held_file.size()) std::strcpy(held_file.data(), file_.c_str());
-  for (const int number : {SIGTERM, SIGINT, SIGHUP})
-    if (std::signal(number, let_go_and_die) == SIG_IGN) std::signal(number, SIG_IGN);  // nohup
 }
 
 FolderLock::~FolderLock() {
   held_file[0] = '\0';
   std::error_code ignored;
   fs::remove(file_, ignored);
+}
+
+void let_go_of_lock() {
+  if (held_file[0] != '\0') unlink(held_file.data());
 }
 
 }  // namespace femxdem

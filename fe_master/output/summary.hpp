@@ -10,7 +10,7 @@ namespace femxdem {
 
 /// How a run ended and what it cost: summary.json.
 struct Summary {
-  std::string status;   ///< "done", "not converged", "failed"
+  std::string status;   ///< "done", "stopped", "not converged", "failed"
   std::string message;  ///< one sentence
   int exit_status = 0;
   int steps = 0;         ///< converged
@@ -24,6 +24,9 @@ struct Summary {
   double evaluate_seconds = 0;            ///< wall time inside MaterialPoints::evaluate
   double trial_seconds = 0;               ///< of the points' trials, summed over the ranks
   double engine_seconds = 0;              ///< of which inside the DEM engine's steps
+  int checkpoints = 0;                    ///< written
+  double checkpoint_seconds = 0;          ///< in all
+  std::uint64_t checkpoint_bytes = 0;     ///< of the last file
   std::uint64_t peak_memory_master = 0;   ///< [byte]
   std::uint64_t peak_memory_workers = 0;  ///< summed over the ranks [byte]
   std::string case_hash;

@@ -43,8 +43,9 @@ class VolumeElements : public MaterialPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
   std::vector<PointReport> reports() const override { return reports_; }
-  SavedStates save() override;
-  void load(const SavedStates& states) override;
+  /// Ranks hand over one state after another, rank 0 holds one of each.
+  void save_each(const TakeState& take) override;
+  void load_each(const StateSource& states) override;
 
   const FarmStatistics& statistics() const { return statistics_; }
   /// Sums over the ranks of what LocalPoints count. Collective with serve().

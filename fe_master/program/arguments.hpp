@@ -15,9 +15,11 @@ struct Arguments {
   std::vector<std::string> overrides;  ///< section.key=value
   bool restart = false;
   bool overwrite = false;
-  std::optional<bool> progress;  ///< RunOptions::progress
-  int noise_samples = 0;  ///< ve path: probes of the stress's jitter in each step
-  int compare = 0;        ///< ve prepare: DEM steps beside the scene's own continuation in YADE
+  std::string time_limit;               ///< of this process, see seconds_of; empty: the scheduler's
+  Moment start = Moment::clock::now();  ///< from which it counts
+  std::optional<bool> progress;         ///< RunOptions::progress
+  int noise_samples = 0;                ///< ve path: probes of the stress's jitter in each step
+  int compare = 0;                      ///< ve prepare: DEM steps beside the scene's own continuation in YADE
   bool markdown = false;
   std::string command_line;
 };

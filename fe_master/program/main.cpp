@@ -10,6 +10,8 @@
 
 #include "analytic_points.hpp"
 #include "case.hpp"
+#include "end_request.hpp"
+#include "end_signals.hpp"
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
@@ -36,6 +38,7 @@ struct Mpi {
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
     MPI_Comm_size(machine, &of_machine);
     MPI_Comm_free(&machine);
+    if (rank > 0) ignore_end_signals();
   }
   ~Mpi() { MPI_Finalize(); }
   Mpi(const Mpi&) = delete;
@@ -60,10 +63,11 @@ void keep_standard_descriptors() {
     if (fcntl(descriptor, F_GETFD) < 0) open("/dev/null", O_RDWR);
 }
 
-/// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
+/// True on the rank that speaks; known before MPI_Init from the environment of Open MPI or of Slurm's srun.
 bool speaks() {
-  const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
-  return rank == nullptr || std::string(rank) == "0";
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
+    if (const char* rank = std::getenv(name)) return std::string(rank) == "0";
+  return true;
 }
 
 /// Trials that a run will ask of its volume elements, about: three evaluations a step.
@@ -165,6 +169,13 @@ void add_progress(CLI::App& command, Arguments& arguments) {
       "--no-progress", [&arguments] { arguments.progress = false; }, "A line for each step");
 }
 
+void add_restart(CLI::App& command, Arguments& arguments) {
+  command.add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  command.add_option("--time-limit", arguments.time_limit,
+                     "Save and end with status 75 before so much time is over: seconds, MM:SS, HH:MM:SS or "
+                     "D-HH:MM:SS (default: the end of the Slurm job)");
+}
+
 void add_commands(CommandLine& line) {
   line.app.require_subcommand(0, 1);
   line.app.add_flag_callback(
@@ -177,7 +188,7 @@ void add_commands(CommandLine& line) {
   Arguments& arguments = line.arguments;
   CLI::App* run_it = add_case_command(line, line.app, "run", "Run a case; also under mpirun -n P", run);
   run_it->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
-  run_it->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  add_restart(*run_it, arguments);
   run_it->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   add_progress(*run_it, arguments);
   add_case_command(line, line.app, "check", "Say all mistakes of a case file, without running it", check);
@@ -191,6 +202,7 @@ void add_ve_commands(CommandLine& line) {
   ve.require_subcommand(1);
   CLI::App* path = add_case_command(line, ve, "path", "Follow the [[path]] of a case with one material point", ve_path);
   path->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
+  add_restart(*path, arguments);
   path->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   add_progress(*path, arguments);
   path->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
@@ -219,6 +231,7 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);                                         // a limit on files' sizes is an error of write
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
   CommandLine line;
+  speaks() ? end_at_signals() : ignore_end_signals();
   for (int i = 0; i < argc; ++i) line.arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
   add_commands(line);
   add_ve_commands(line);

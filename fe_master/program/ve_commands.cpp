@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "end_request.hpp"
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "locations.hpp"
@@ -90,6 +91,13 @@ std::vector<VeParameters> pool_of(const Arguments& arguments) {
   return pool;
 }
 
+/// By when this process must have ended: --time-limit, counted from its start, or the end of the scheduler's job.
+std::optional<Moment> ends_before(const Arguments& arguments) {
+  if (arguments.time_limit.empty()) return end_of_job();
+  const std::chrono::duration<double> limit(seconds_of(arguments.time_limit));
+  return arguments.start + std::chrono::duration_cast<Moment::duration>(limit);
+}
+
 }  // namespace
 
 RunOptions run_options(const Arguments& arguments, const Case& c, const char* ending) {
@@ -106,6 +114,7 @@ RunOptions run_options(const Arguments& arguments, const Case& c, const char* en
   options.command_line = arguments.command_line;
   options.progress = arguments.progress;
   options.versions = library_versions();
+  options.ends_before = ends_before(arguments);
   return options;
 }
 

@@ -9,6 +9,7 @@
 #include "learned_tangent.hpp"
 #include "material_points.hpp"
 #include "mid_step_points.hpp"
+#include "named_arrays.hpp"
 
 namespace femxdem {
 
@@ -62,6 +63,10 @@ class PathDriver {
   /// Adopts the converged trial.
   void commit();
 
+  /// What the next solve() depends on but for the point: the committed state within `segment`.
+  void save(NamedArrays& arrays) const;
+  void load(const NamedArrays& arrays, const PathSegment& segment);
+
   /// The last equilibrium: where the answer belongs in the last committed step, or the start of the segment.
   const Tensor2& F() const { return F_; }
   const Response& response() const { return response_; }
@@ -82,6 +87,8 @@ class PathDriver {
   PathVector correction(const PathVector& E, const Tensor2& stress, const PathVector& missing,
                         const PathVector& given) const;
   bool evaluate(const Tensor2& F, PathStep& step);
+  template <class Driver, class Visit>
+  static void visit_state(Driver& driver, Visit visit);
 
   MidStepPoints point_;
   SolverParameters parameters_;

@@ -34,8 +34,8 @@ void RunFiles::whole(double time) {
 }
 
 std::string RunFiles::stopped_by_the_disk(const std::string& reason) {
-  const std::string state = last_checkpoint_ > 0
-                                ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
+  const std::string state = last_checkpoint_
+                                ? fmt::format("--restart goes on from the checkpoint after step {}", *last_checkpoint_)
                                 : "there is no checkpoint to restart from";
   const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again",
                                           reason, whole_step_, whole_time_, state);
@@ -47,7 +47,10 @@ std::string RunFiles::stopped_by_the_disk(const std::string& reason) {
 }
 
 int RunFiles::finish(int status, const std::string& message) {
-  summary.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
+  summary.status = status == kDone           ? "done"
+                   : status == kNotConverged ? "not converged"
+                   : status == kRunAgain     ? "stopped"
+                                             : "failed";
   summary.message = message;
   summary.exit_status = status;
   summary.wall_seconds = wall();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "case.hpp"
+#include "end_request.hpp"
 #include "errors.hpp"
 #include "history.hpp"
 #include "log.hpp"
@@ -25,9 +26,10 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
-  std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
-  std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
-  std::optional<bool> progress;      ///< see Log
+  std::vector<std::string> remarks;   ///< for log.txt: the engine; what was adopted, dropped, reset
+  std::shared_ptr<FolderLock> lock;   ///< of the folder where it is prepared already
+  std::optional<Moment> ends_before;  ///< the process must have ended by then
+  std::optional<bool> progress;       ///< see Log
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 
@@ -53,6 +55,8 @@ class RunFiles {
   void whole(double time);
   /// There is a checkpoint of the last step on the disk.
   void checkpoint_written() { last_checkpoint_ = summary.steps; }
+  /// Its step; nothing where there is none.
+  std::optional<int> last_checkpoint() const { return last_checkpoint_; }
 
  private:
   std::shared_ptr<FolderLock> lock_;  // before any file in the folder
@@ -65,7 +69,8 @@ class RunFiles {
   const RunOptions& options_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::optional<History> history_;
-  int whole_step_ = 0, last_checkpoint_ = 0;  // 0: none
+  int whole_step_ = 0;
+  std::optional<int> last_checkpoint_;
   double whole_time_ = 0;
 };
 

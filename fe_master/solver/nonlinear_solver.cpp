@@ -98,6 +98,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
   Eigen::VectorXd z, change;
 
   while (result.iterations() < parameters_.max_iterations) {
+    if (result.stopped = told_to_end_(); result.stopped) return result;
     Iteration& now = result.table.emplace_back();
     if (!evaluate(trial, result)) return result;
     const Eigen::VectorXd residual = scaled_residual(trial);

@@ -6,7 +6,7 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   const femxdem::Removed checkpoint{femxdem::file_of(bytes, size, ".h5")};
   try {
-    femxdem::read_checkpoint(checkpoint.file, {{"yade", "2023.02a"}});
+    femxdem::CheckpointFile(checkpoint.file).read({{"yade", "2023.02a"}});
   } catch (const femxdem::UserError&) {
   }
   return 0;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "analytic_points.hpp"
 #include "checkpoint.hpp"
 #include "errors.hpp"
 #include "output_folder.hpp"
@@ -34,7 +35,7 @@ Case small_case(LoadKind kind) {
   return c;
 }
 
-Checkpoint checkpoint_of(const Case& c, double time) { return {3, time, 0.1, {}, {"state"}, comparable_toml(c), {}}; }
+Checkpoint checkpoint_of(const Case& c, double time) { return {3, time, 0.1, {}, comparable_toml(c), {}}; }
 
 std::string refusal(const Checkpoint& checkpoint, const Case& c) {
   try {
