@@ -41,6 +41,8 @@ class Place:
     def __init__(self, program, runs, environment, cases):
         self.program, self.runs, self.environment, self.cases = program, Path(runs), environment, cases
         self.references = {}
+        self.work = self.runs / f"of_{os.getpid()}"  # two of them may share the folder of values
+        self.work.mkdir(parents=True, exist_ok=True)
 
     def command(self, fault, folder, existing, settings=()):
         file, own = self.cases[fault.case]
@@ -52,7 +54,7 @@ class Place:
         """Folder of the run that nothing has struck."""
         key = fault.case, fault.settings
         if key not in self.references:
-            folder = self.runs / f"reference_{len(self.references)}_{fault.case}"
+            folder = self.work / f"reference_{len(self.references)}_{fault.case}"
             clean = Fault("reference", fault.case, settings=fault.settings)
             done = subprocess.run(self.command(clean, folder, ["--overwrite"]), env=self.environment, capture_output=True, text=True)
             if done.returncode != 0:
@@ -124,7 +126,7 @@ def near(folder, reference):
 
 def inject(place, fault):
     """What came of it: {status, said, readable, steps, restart, differs, way}."""
-    reference, folder = place.reference(fault), place.runs / "struck"
+    reference, folder = place.reference(fault), place.work / "struck"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     undo = fault.prepare(folder) if fault.prepare else None
@@ -165,7 +167,7 @@ def _struck(place, fault, folder):
         for what, most in fault.limits.items():
             resource.setrlimit(what, (most, most))
 
-    said = place.runs / "said.txt"
+    said = place.work / "said.txt"
     with open(said, "w") as out:
         run = subprocess.Popen(place.command(fault, folder, ["--overwrite"]), env={**place.environment, **fault.environment},
                                stdout=out, stderr=out, preexec_fn=limit if fault.limits else None)
