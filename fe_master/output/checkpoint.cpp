@@ -29,8 +29,10 @@ SavedStates read_states(const Hdf5File& h5) {
   std::vector<std::string> distinct;
   for (const std::string& name : h5.members("/states")) distinct.push_back(h5.read_bytes("/states/" + name));
   SavedStates states;
-  for (const double number : h5.read("/state_of_point"))
-    states.push_back(distinct.at(static_cast<std::size_t>(number)));
+  for (const double number : h5.read("/state_of_point")) {
+    if (!(number >= 0 && number < static_cast<double>(distinct.size()))) throw Hdf5Error("a point without a state");
+    states.push_back(distinct[static_cast<std::size_t>(number)]);
+  }
   return states;
 }
 
@@ -126,7 +128,9 @@ Checkpoint read_checkpoint(const std::filesystem::path& file, const std::string&
     refuse_other_case(file, h5, case_hash);
     refuse_other_versions(file, h5, versions);
     return read_contents(h5);
-  } catch (const Hdf5Error&) {
+  } catch (const UserError&) {
+    throw;
+  } catch (const std::exception&) {  // of HDF5, or for want of the memory that damaged lengths ask for
     throw UserError(fmt::format("{}: is not a whole checkpoint; start without --restart", file.string()));
   }
 }

@@ -105,6 +105,12 @@ def same_bits(folder, reference):
     return next((name for name in its if its[name].tobytes() != mine[name].tobytes()), "")
 
 
+def strays(folder):
+    """Files that no run is to leave."""
+    whole = {"case.toml", "checkpoint.h5", "history.csv", "log.txt", "results.h5", "results.xdmf", "summary.json"}
+    return sorted(file.name for file in folder.iterdir() if file.name not in whole)
+
+
 def same_end(folder, reference):
     """The same of the last step alone."""
     if history(folder)[-1:] != history(reference)[-1:]:
@@ -157,7 +163,8 @@ def inject(place, fault):
         return {**seen, "way": existing[0], "differs": f"ended with {again.returncode}: {last}"}
     if fault.destroys:
         return {**seen, "way": "noticed", "differs": same_end(folder, reference)}
-    return {**seen, "way": existing[0], "differs": same_bits(folder, reference)}
+    left = strays(folder)
+    return {**seen, "way": existing[0], "differs": f"left behind: {left}" if left else same_bits(folder, reference)}
 
 
 def _struck(place, fault, folder):
