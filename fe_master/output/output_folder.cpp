@@ -34,9 +34,8 @@ void remove_leftovers(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     for (const std::string_view file : kFilesOfARun)
-      for (const std::string_view part : {"", ".undo"})
-        if (name.size() == file.size() + part.size() + kSuffix && name.starts_with(std::string(file) + std::string(part) + "."))
-          leftovers.push_back(entry.path());
+      if (name.size() == file.size() + kSuffix && name.starts_with(std::string(file) + "."))
+        leftovers.push_back(entry.path());
   }
   for (const fs::path& leftover : leftovers) fs::remove(leftover);
 }
