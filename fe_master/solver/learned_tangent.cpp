@@ -153,7 +153,11 @@ Misfit LearnedTangent::learn(const Tensor2& F, const Tensor2& stress) {
   stress_ += y;
   const MandelVector expected = C_ * s, missed = y - expected;
   const Misfit misfit = first_ ? Misfit{} : Misfit{missed.squaredNorm(), expected.squaredNorm()};
-  C_ += missed * gain(s).transpose();
+  if (limits_.scatter == 0) {
+    C_ += (first_ ? limits_.first : 1) * missed * s.transpose() / s.squaredNorm();
+  } else {
+    C_ += missed * gain(s).transpose();
+  }
   first_ = false;
   bound();
   return misfit;
@@ -169,7 +173,6 @@ Tensor2 LearnedTangent::predict(const Tensor2& F, const Tensor2& from, const Ten
 
 MandelVector LearnedTangent::gain(const MandelVector& strain_change) {
   const double weight = first_ ? limits_.first : 1;
-  if (limits_.scatter == 0) return weight * strain_change / strain_change.squaredNorm();
   const MandelVector s = cholesky_.transpose() * strain_change;
   const double size = s.squaredNorm();
   if (first_) first_change_ = size;

@@ -87,7 +87,7 @@ class LearnedTangent {
  private:
   MandelVector strain(const Tensor2& U) const;  // sym(U U_n^-1) - I
   MandelVector unrotated(const Tensor2& stress, const Tensor2& R) const;
-  MandelVector gain(const MandelVector& strain_change);  // g of the pair
+  MandelVector gain(const MandelVector& strain_change);  // g of a pair that scatters
   void bound();
 
   StrainComponents components_;
