@@ -11,13 +11,15 @@ readonly PACKAGES=(
   libopenmpi-dev openmpi-bin libeigen3-dev libsuitesparse-dev libhdf5-dev libgmsh-dev gmsh
   libtomlplusplus-dev libcli11-dev libfmt-dev libgtest-dev libbenchmark-dev
 )
+readonly TEST_PACKAGES=(chromium-headless-shell)  # opens the page of `femxdem report`
 
 usage() {
   cat <<'TEXT'
-usage: bash setup.sh build | demo | test [LABEL]
+usage: bash setup.sh build | demo | test [LABEL] | install PREFIX
   build         install what is missing, configure and build to build/release
   demo          build, then a biaxial test on YADE volume elements, 2 ranks: figures in out/demo
   test [LABEL]  build, then all tests, or those of a label: unit, mpi, bridge, yade
+  install PREFIX  build the program alone and install it to PREFIX, a folder that may be moved: PREFIX/bin/femxdem
 TEXT
 }
 
@@ -29,7 +31,7 @@ fail() {
 
 missing_packages() {
   local package
-  for package in "${PACKAGES[@]}"; do
+  for package in "${PACKAGES[@]}" "$@"; do
     [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || echo "$package"
   done
 }
@@ -37,7 +39,7 @@ missing_packages() {
 install_packages() {
   command -v apt-get >/dev/null || fail "no apt-get here: this needs Debian 12 (bookworm) or a container of it"
   local missing as_root=()
-  mapfile -t missing < <(missing_packages)
+  mapfile -t missing < <(missing_packages "$@")
   if ((${#missing[@]} == 0)); then
     return
   fi
@@ -64,7 +66,14 @@ build() {
   if [[ ! -f $BUILD/build.ninja ]]; then
     cmake --preset release
   fi
-  cmake --build --preset release
+  cmake --build --preset release "$@"
+}
+
+install_program() {
+  [[ -n ${1:-} ]] || fail "install wants a folder, such as /usr/local or ~/femxdem" 2
+  build --target femxdem femxdem-worker compact_cell contact_network
+  cmake --install "$BUILD" --prefix "$1"
+  say "installed: $1/bin/femxdem"
 }
 
 # Open MPI refuses root and more ranks than cores unless told.
@@ -81,6 +90,7 @@ run_tests() {
     selected=(-L "^$1\$")
   fi
   build
+  install_packages "${TEST_PACKAGES[@]}"
   allow_mpi_everywhere
   count=$(ctest --test-dir "$BUILD" -N "${selected[@]}" | sed -n 's/^Total Tests: //p')
   if ((count == 0)); then
@@ -103,8 +113,10 @@ demo() {
   say "the single volume element on the same path"
   "$BUILD/femxdem" ve path validation/biaxial/demo_ve.toml --out out/demo_ve --overwrite
   say "figures"
-  "$PYTHON" fe_master/program/plot.py out/demo --ve out/demo_ve
+  "$BUILD/femxdem" plot out/demo --ve out/demo_ve
+  "$BUILD/femxdem" report out/demo --ve out/demo_ve
   cat <<'TEXT'
+out/demo/report.html      all of the following on one page, for a browser; needs no network
 out/demo/curve.png        axial stress over axial strain: the specimen over its single volume element
 out/demo/maps_*.png       where the strain has gone: second invariant, volume change, porosity, cost
 out/demo/convergence.png  evaluations of all volume elements in each step
@@ -119,6 +131,7 @@ case "${1:-}" in
   build) build ;;
   demo) demo ;;
   test) run_tests "${2:-}" ;;
+  install) install_program "${2:-}" ;;
   *)
     usage
     exit 2

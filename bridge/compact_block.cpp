@@ -106,7 +106,7 @@ bool consistent(const CompactArrays& a) {
   for (std::uint32_t k = 0; k < h.classes; ++k)
     if (!(a.classes[k].when_broken >= 0 && a.classes[k].when_broken < h.classes && a.classes[k].when_aged < h.classes))
       return false;
-  return h.time_step >= 0 && std::isfinite(h.H[0]) && (h.law == CompactLaw::cohesive || h.law == CompactLaw::friction);
+  return h.time_step >= 0 && std::isfinite(h.H[0]) && h.law <= CompactLaw::paper;
 }
 
 }  // namespace
@@ -135,7 +135,8 @@ void CompactBlock::bind() {
 }
 
 void CompactBlock::assign(const CompactBlock& other) {
-  lines_.resize(other.lines_.size());
+  if (lines_.capacity() < other.lines_.size()) std::vector<Line>(other.lines_.size()).swap(lines_);
+  lines_.resize(other.lines_.size());  // which would take twice the room, had it to grow
   std::memcpy(static_cast<void*>(lines_.data()), other.lines_.data(), other.lines_.size() * kLine);
   bind();
 }

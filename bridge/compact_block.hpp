@@ -15,6 +15,7 @@ namespace femxdem {
 enum class CompactLaw : std::uint32_t {
   cohesive,  ///< YADE's Law2_ScGeom6D_CohFrictPhys_CohesionMoment, momentRotationLaw off
   friction,  ///< YADE's Law2_ScGeom_FrictPhys_CundallStrack
+  paper,     ///< that of Nguyen et al. (2017), which YADE has not: see compact_kernel.hpp
 };
 
 using Row3 = std::array<double, 9>;  ///< 3 x 3, row-major
@@ -63,7 +64,7 @@ constexpr int unpack_shift(std::int32_t packed, int axis) {
 
 struct CompactHeader {
   static constexpr std::array<char, 8> kMagic = {'f', 'x', 'd', 'c', 'e', 'l', 'l', '\n'};
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::array<char, 8> magic = kMagic;
   std::uint32_t version = kVersion;
@@ -85,6 +86,7 @@ struct CompactHeader {
   double constant_kn = 0, constant_ks = 0;    ///< of later contacts [N/m]; NaN: from the materials
   double safety = std::numeric_limits<double>::quiet_NaN();  ///< of the time step; NaN: it follows nothing
   double density = 0, mean_diameter = 0, solid_volume = 0;   ///< [kg/m^3], [m], [m^3]
+  double viscous_damping = 0;                                ///< of the paper's law: ratio of the critical [-]
 };
 
 /// Where everything of a block is. All arrays are as long as their capacity, rounded up to kLanes, and start at a cache

@@ -117,6 +117,17 @@ CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, Sampling sa
   return result;
 }
 
+void CompactCell::rest() { femxdem::rest(*block_); }
+
+std::optional<std::string> CompactCell::hold(long steps) {
+  const CompactTrial strained = trial_;
+  std::optional<std::string> failure = deform(Row3{}, steps).failure;
+  trial_ = {strained.steps + trial_.steps, strained.rate, strained.seconds + trial_.seconds};
+  return failure;
+}
+
+bool CompactCell::law_of_yade() const { return block_->header().law != CompactLaw::paper; }
+
 bool CompactCell::flip() { return femxdem::flip(*block_); }
 
 Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }

@@ -71,8 +71,15 @@ class CompactCell {
   Deformed deform(const std::array<double, 9>& L, long steps, Sampling sampling);
   Deformed deform(const std::array<double, 9>& L, long steps) { return deform(L, steps, Sampling{}); }
 
-  /// Replaces the cell by the shortest one of the same lattice, as deform does by itself before a sheared cell becomes
-  /// too narrow: stress and contacts stay to round-off, so that shear of any size goes on. Whether it was another.
+  /// All velocities become zero, those of the cell's deformation too, and with them the dashpots' forces.
+  void rest();
+  /// `steps` further steps of the last deform, without deformation: they count as its own. Why the cell cannot go on.
+  std::optional<std::string> hold(long steps);
+  /// Whether YADE has the law of its contacts, and so can repeat what it does.
+  bool law_of_yade() const;
+
+  /// A cell that has become long becomes a shorter one of the same lattice, as in every step of deform: stress and
+  /// contacts stay to round-off, so that shear of any size goes on. Whether it was too long.
   bool flip();
 
   /// Cauchy stress of Love and Weber, (1/V) sum (normal + shear force) (x) branch in the order of the contacts' ids,
@@ -93,7 +100,9 @@ class CompactCell {
   /// network with its grains in equilibrium.
   std::array<double, 81> stiffness(bool relaxed) const;
   VeInfo info() const;
-  /// The time step becomes what the contact network of now asks for (yade_scripts/time_step.py); between load steps.
+  /// The time step becomes what the contact network of now asks for, between load steps: within 1e-12 of what
+  /// yade_scripts/time_step.py finds, which sums in another order. With ve.sorted_contacts YADE's cells take it from
+  /// here.
   void follow_network();
 
   /// What compact_scene.write_back puts into a YADE scene, in the format of the export.

@@ -84,6 +84,11 @@ PYBIND11_MODULE(compact_cell, module) {
            [](const CompactCell& c, bool relaxed) {
              return array(c.stiffness(relaxed), {3, 3, 3, 3});
            })
+      .def("rest", &CompactCell::rest)
+      .def("hold",
+           [](CompactCell& c, long steps) {
+             if (const auto failure = c.hold(steps)) throw std::runtime_error(*failure);
+           })
       .def("flip", &CompactCell::flip)
       .def("unbalanced_force", &CompactCell::unbalanced_force)
       .def("follow_network", &CompactCell::follow_network)

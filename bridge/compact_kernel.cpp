@@ -116,7 +116,8 @@ struct Pairs {
   Vec3<W> shifted;  ///< place of the image of j [m]
   Vec3<W> normal;
   Vec<W> overlap;
-  Vec3<W> shear;  ///< force turned with the contact, minus ks times the slip
+  Vec<W> opening;  ///< rate at which the overlap becomes less [m/s]
+  Vec3<W> shear;   ///< force turned with the contact, minus ks times the slip
 
   FEMXDEM_INLINE void measure(const CompactArrays& a, const CompactCellMotion& cell, std::size_t at) {
     i.gather(a.spheres, [&](int k) FEMXDEM_LAMBDA { return a.i[at + static_cast<std::size_t>(k)]; });
@@ -136,7 +137,9 @@ struct Pairs {
     slip = slip + cross(wj, scaled<W>(-rj, normal));
     slip = slip - cross(wi, scaled<W>(ri, normal));
     slip = slip + scaled<W>(alpha, times(cell.G, periods));
-    slip = slip - scaled<W>(dot(normal, slip), normal);
+    const Vec<W> along = dot(normal, slip);
+    opening = along / alpha;
+    slip = slip - scaled<W>(along, normal);
     const Vec3<W> before = load3<W>(a.normal, at);
     const Vec<W> twist = (cell.dt * 0.5) * dot(before, wi + wj);
     shear = load3<W>(a.shear, at);
@@ -284,6 +287,47 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
   return lost_count;
 }
 
+/// Constants of the dashpots of W contacts [N s/m].
+template <int W>
+FEMXDEM_INLINE Vec<W> dashpots(const CompactArrays& a, std::size_t at, Vec<W> kn) {
+  Vec<W> mi{}, mj{};
+  repeat<W>([&](auto k) FEMXDEM_LAMBDA {
+    lane<W>(mi, k) = a.mass[a.i[at + k]];
+    lane<W>(mj, k) = a.mass[a.j[at + k]];
+  });
+  return (2 * a.header->viscous_damping) * square_root(kn * (mi * mj / (mi + mj)));
+}
+
+template <int W>
+FEMXDEM_INLINE std::size_t paper(const CompactArrays& a, const CompactCellMotion& cell, std::uint32_t* lost) {
+  std::size_t lost_count = 0;
+  const Vec<W> zero{};
+  const bool viscous = a.header->viscous_damping > 0;
+  for (std::size_t at = 0; at < a.header->contacts; at += W) {
+    Pairs<W> p;
+    p.measure(a, cell, at);
+    const Classes<W> c(a, at);
+    const Vec<W> ends = greater(zero, p.overlap), kn = load<Vec<W>>(a.kn + at);
+    Vec<W> repulsion = kn * p.overlap;
+    if (viscous) repulsion = repulsion - dashpots<W>(a, at, kn) * p.opening;
+    repulsion = repulsion > zero ? repulsion : zero;
+    const Vec<W> normal_force = repulsion - c.adhesion;
+    const Vec<W> limit = repulsion * c.tangent, size = square_root(dot(p.shear, p.shear));
+    const Vec3<W> shear = scaled<W>(size > limit ? limit / size : splat<W>(1.0), p.shear);
+    Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
+    f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
+    const Vec3<W> t = cross(p.normal, f);
+    const Vec<W> half = 0.5 * p.overlap;
+    const Wrenches<W> on_i(f, scaled<W>(p.i.radius() - half, t)), on_j(-f, scaled<W>(p.j.radius() - half, t));
+    push<W>(a, at, on_i, on_j);
+    store(a.normal_force + at, normal_force);
+    store3<W>(a.shear, at, shear);
+    store3<W>(a.normal, at, p.normal);
+    if (any<W>(ends)) lost_count += note<W>(a, at, ends, lost + lost_count);
+  }
+  return lost_count;
+}
+
 #define FEMXDEM_LOOPS(NAME, LEVEL, W)                                                                          \
   LEVEL double NAME##_integrate(const CompactArrays& a, const CompactMotion& m) { return integrate<W>(a, m); } \
   LEVEL std::size_t NAME##_cohesive(const CompactArrays& a, const CompactCellMotion& c, unsigned* to) {        \
@@ -292,7 +336,10 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
   LEVEL std::size_t NAME##_friction(const CompactArrays& a, const CompactCellMotion& c, unsigned* to) {        \
     return friction<W>(a, c, to);                                                                              \
   }                                                                                                            \
-  constexpr CompactLoops NAME##_loops = {NAME##_integrate, NAME##_cohesive, NAME##_friction};
+  LEVEL std::size_t NAME##_paper(const CompactArrays& a, const CompactCellMotion& c, unsigned* to) {           \
+    return paper<W>(a, c, to);                                                                                 \
+  }                                                                                                            \
+  constexpr CompactLoops NAME##_loops = {NAME##_integrate, NAME##_cohesive, NAME##_friction, NAME##_paper};
 
 FEMXDEM_LOOPS(baseline, , 2)
 #ifdef __x86_64__

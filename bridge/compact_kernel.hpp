@@ -32,6 +32,10 @@ struct CompactLoops {
   /// to their end, rising; returns how many.
   std::size_t (*cohesive)(const CompactArrays&, const CompactCellMotion&, std::uint32_t* lost);
   std::size_t (*friction)(const CompactArrays&, const CompactCellMotion&, std::uint32_t* lost);
+  /// The law of Nguyen et al. (2017) to the letter. While the overlap delta lasts, f_n = f_el - f_c and |f_t| <= mu
+  /// f_el, f_el = kn delta: no plateau in tension, sliding leaves f_n alone, the contact ends with the overlap. With
+  /// dashpots f_el = max(0, kn delta + c d(delta)/dt), c = 2 ratio sqrt(kn m), m = m_i m_j / (m_i + m_j).
+  std::size_t (*paper)(const CompactArrays&, const CompactCellMotion&, std::uint32_t* lost);
 };
 
 const CompactLoops& compact_loops();  ///< of kernel_in_use()

@@ -46,6 +46,7 @@ bool slides(const CompactArrays& a, std::size_t c) {
     const double overlap = a.spheres[a.i[c]].radius + a.spheres[a.j[c]].radius - norm(branch(a, c));
     limit = std::max(kind.shear_adhesion + kind.tangent * (a.kn[c] * (overlap - a.unp[c])), 0.0);
   }
+  if (a.header->law == CompactLaw::paper) limit = kind.tangent * (a.normal_force[c] + kind.normal_adhesion);
   return norm(at(a.shear, c)) >= (1 - 1e-6) * limit;
 }
 

@@ -14,7 +14,7 @@ namespace femxdem {
 namespace {
 
 constexpr std::string_view kMagic = "fxdscene";
-constexpr std::int64_t kVersion = 1;
+constexpr std::int64_t kVersion = 2;
 
 /// Numbers one after the other; the same sequence of calls reads a scene and writes it.
 class Reader {
@@ -66,7 +66,7 @@ void header_numbers(Stream& s, Header& h) {
   for (auto* tensor : {&h.H, &h.trsf, &h.L, &h.previous_L})
     for (auto& number : *tensor) s.template number<double>(number);
   for (auto* number : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
-                       &h.mean_diameter, &h.solid_volume})
+                       &h.mean_diameter, &h.solid_volume, &h.viscous_damping})
     s.template number<double>(*number);
 }
 
@@ -112,7 +112,8 @@ void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
 class ClassTable {
  public:
   explicit ClassTable(const CompactHeader& header)
-      : cohesive_(header.law == CompactLaw::cohesive ? 1.0 : 0.0),
+      : cohesive_(header.law == CompactLaw::friction ? 0.0 : 1.0),
+        at_once_(header.law == CompactLaw::paper && !std::isnan(header.new_adhesion)),
         adhesion_(header.new_adhesion),
         friction_(header.new_friction) {}
 
@@ -129,8 +130,9 @@ class ClassTable {
     classes_[at].when_broken = broken;
     return at;
   }
-  /// Contacts that have just formed; if they become adhesive, they wait for it.
+  /// Contacts that have just formed; if they become adhesive, they wait for it, but not under the paper's law.
   std::uint32_t add_new(double tangent) {
+    if (at_once_) return add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0, 0, -1, 1, 0, 0});
     const std::uint32_t at = add({0, 0, 0, tangent, cohesive_, cohesive_, 0, -1, 1, 0, 0});
     if (!std::isnan(adhesion_) && classes_[at].when_aged < 0) {
       const std::uint32_t aged = add({adhesion_, friction_ * adhesion_, 0, tangent, 0, 0, 0, -1, 0, 0, 0});
@@ -142,7 +144,9 @@ class ClassTable {
 
  private:
   using Key = std::array<double, 7>;
-  double cohesive_, adhesion_, friction_;
+  double cohesive_;
+  bool at_once_;
+  double adhesion_, friction_;
   std::map<Key, std::uint32_t> places_;
   std::vector<CompactClass> classes_;
 };
@@ -166,6 +170,8 @@ void fill_contacts(const CompactArrays& a, const std::vector<SceneContact>& cont
     a.class_of[c] = class_of[c];
     a.header->new_contacts += a.classes[class_of[c]].when_aged >= 0;
     a.kn[c] = from.kn, a.ks[c] = from.ks, a.unp[c] = from.unp, a.normal_force[c] = from.normal_force;
+    const double adhesion = a.classes[class_of[c]].normal_adhesion;
+    if (a.header->law == CompactLaw::paper) a.unp[c] = adhesion > 0 ? adhesion / a.kn[c] : 0;
     for (std::size_t k = 0; k < 3; ++k) a.shear[k][c] = from.shear[k], a.normal[k][c] = from.normal[k];
   }
 }
@@ -187,7 +193,7 @@ Head read_head(Reader& reader) {
   header_numbers(reader, head.header);
   const auto n = static_cast<std::size_t>(head.spheres), m = static_cast<std::size_t>(head.contacts);
   const bool sizes = head.spheres >= 2 && head.contacts >= 0 && n < 1U << 28 && m < 1U << 28;
-  if (!sizes || law < 0 || law > 1 || head.header.start_vectors > 1 ||
+  if (!sizes || law < 0 || law > 2 || head.header.start_vectors > 1 ||
       reader.left() != 8 * (n * (25 + 6 * head.header.start_vectors) + m * 22))
     throw UserError("export of a YADE scene: its size is wrong; export it again");
   head.header.law = static_cast<CompactLaw>(law);
@@ -237,6 +243,7 @@ CompactBlock block_of_scene(std::string_view exported) {
     for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) reader.number<double>(a.start[k]);
   fill_contacts(a, contacts, class_of);
   make_list(block);
+  if (h.law == CompactLaw::paper) find_forces(block);
   return block;
 }
 

@@ -103,7 +103,9 @@ void insert_contact(CompactBlock& block, const CompactPair& p) {
   a.class_of[at] = class_of_new(a, std::min(a.tangent[p.i], a.tangent[p.j]));
   if (a.classes[a.class_of[at]].when_aged >= 0) ++h->new_contacts;
   set_stiffness(a, at, p);
-  a.unp[at] = a.normal_force[at] = 0;
+  const double adhesion = h->law == CompactLaw::paper ? a.classes[a.class_of[at]].normal_adhesion : 0;
+  a.unp[at] = adhesion > 0 ? adhesion / a.kn[at] : 0;
+  a.normal_force[at] = 0;
   for (std::size_t k = 0; k < 3; ++k) a.shear[k][at] = a.normal[k][at] = 0;
 }
 
@@ -147,6 +149,19 @@ void remove_contacts(CompactBlock& block, const std::uint32_t* lost, std::size_t
   h.contacts -= static_cast<std::uint32_t>(count);
 }
 
+/// Forces of all contacts, those of this block's law, after `time` [s] of the slip that goes on.
+void contact_forces(CompactBlock& block, double time, const Row3& G) {
+  const CompactHeader& h = block.header();
+  const CompactCellMotion cell{time, h.H, G};
+  static thread_local std::vector<std::uint32_t> lost;
+  if (lost.size() < h.contacts) lost.resize(h.contacts + h.contacts / 4);
+  const CompactLoops& loops = compact_loops();
+  const auto contacts = h.law == CompactLaw::cohesive   ? loops.cohesive
+                        : h.law == CompactLaw::friction ? loops.friction
+                                                        : loops.paper;
+  remove_contacts(block, lost.data(), contacts(block.arrays(), cell, lost.data()));
+}
+
 }  // namespace
 
 Row3 product(const Row3& A, const Row3& B) {
@@ -182,7 +197,7 @@ std::uint32_t class_of_new(const CompactArrays& a, double tangent) {
 }
 
 void step(CompactBlock& block) {
-  flip_when_narrow(block);
+  flip(block);
   Row3 G;
   const double reach = move(block.header(), block.arrays(), G);
   ++block.header().iteration;
@@ -193,13 +208,20 @@ void step(CompactBlock& block) {
   } else {
     find_contacts(block, reach);
   }
-  const CompactHeader& h = block.header();
-  const CompactCellMotion cell{h.time_step, h.H, G};
-  static thread_local std::vector<std::uint32_t> lost;
-  if (lost.size() < h.contacts) lost.resize(h.contacts + h.contacts / 4);
-  const CompactLoops& loops = compact_loops();
-  const auto contacts = h.law == CompactLaw::cohesive ? loops.cohesive : loops.friction;
-  remove_contacts(block, lost.data(), contacts(block.arrays(), cell, lost.data()));
+  contact_forces(block, block.header().time_step, G);
+}
+
+void find_forces(CompactBlock& block) {
+  const CompactArrays& a = block.arrays();
+  for (std::uint32_t s = 0; s < a.header->spheres; ++s) a.spheres[s].f = a.spheres[s].t = {};
+  contact_forces(block, 0, product(a.header->previous_L, a.header->H));
+}
+
+void rest(CompactBlock& block) {
+  const CompactArrays& a = block.arrays();
+  for (std::uint32_t s = 0; s < a.header->spheres; ++s) a.spheres[s].v = a.spheres[s].w = {};
+  a.header->L = a.header->previous_L = {};
+  find_forces(block);
 }
 
 }  // namespace femxdem

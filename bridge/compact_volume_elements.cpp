@@ -10,6 +10,7 @@
 #include <numeric>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "errors.hpp"
 #include "hash.hpp"
@@ -34,6 +35,9 @@ struct ByBits {
   bool operator()(const Tensor2& a, const Tensor2& b) const { return std::memcmp(a.data(), b.data(), sizeof a) < 0; }
 };
 
+/// Trials by what decides them: the cell that they start from, DEM steps, and the stretch at their end.
+using TrialNumbers = std::map<std::pair<const CompactCell*, long>, std::map<Tensor2, std::size_t, ByBits>>;
+
 }  // namespace
 
 CompactVolumeElements::CompactVolumeElements(WorkerProcess& worker, VolumeElementOptions options,
@@ -57,7 +61,7 @@ CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& 
                                   exported.bytes));
     point.cell = std::make_shared<CompactCell>(CompactCell::from_scene(exported.bytes));
     point.strained.origin = saved ? saved->origin : hash(scene);
-    if (!saved) referee_.add_origin(point.strained.origin, scene);
+    if (!saved && point.cell->law_of_yade()) referee_.add_origin(point.strained.origin, scene);
     const VeInfo info = point.cell->info();
     if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
     point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
@@ -82,6 +86,7 @@ void CompactVolumeElements::add(const std::string& state, std::size_t count) {
 
 void CompactVolumeElements::remove(std::size_t index) {
   points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(index));
+  trials_.clear();
   trial_pending_ = false;
 }
 
@@ -124,29 +129,46 @@ std::vector<std::size_t> CompactVolumeElements::longest_first() const {
   return order;
 }
 
-/// Points that start from the same cell and ask for the same of it make one trial.
+/// Points that start from the same cell and ask for the same of it make one trial; what the last trial has made is
+/// kept.
 void CompactVolumeElements::group(const std::vector<Straining>& plans) {
-  for (Trial& trial : trials_) spare_.push_back(std::move(trial.cell));
-  std::erase_if(spare_, [](const Cell& cell) { return cell == nullptr || cell.use_count() > 1; });
-  trials_.clear();
+  std::vector<Trial> last = std::exchange(trials_, {});
+  TrialNumbers made, known;
+  for (std::size_t t = 0; t < last.size(); ++t) {
+    if (last[t].from != nullptr && !last[t].failure)
+      made[{last[t].from, last[t].straining.steps}][last[t].straining.U] = t;
+  }
   trial_of_point_.assign(size(), 0);
-  std::map<std::pair<const CompactCell*, long>, std::map<Tensor2, std::size_t, ByBits>> known;
   for (std::size_t p = 0; p < size(); ++p) {
     if (plans[p].refusal) {
       trial_of_point_[p] = trials_.size();
       trials_.emplace_back().first = p;
       continue;
     }
-    auto& of_cell = known[{points_[p].cell.get(), plans[p].steps}];
-    const auto [entry, added] = of_cell.try_emplace(plans[p].U, trials_.size());
+    const std::pair start{static_cast<const CompactCell*>(points_[p].cell.get()), plans[p].steps};
+    const auto [entry, added] = known[start].try_emplace(plans[p].U, trials_.size());
     trial_of_point_[p] = entry->second;
     if (!added) continue;
     Trial& trial = trials_.emplace_back();
+    if (const auto earlier = made[start].find(plans[p].U); earlier != made[start].end()) {
+      trial = std::move(last[earlier->second]);
+      trial.kept = true;
+    }
+    trial.from = start.first;
     trial.first = p;
     trial.straining = plans[p];
-    trial.cell = spare_cell();
-    trial.checked =
-        plans[p].steps > 0 && referee_.knows(points_[p].strained.origin) && drawn(drawn_++) < compact_.check_share;
+    trial.checked = !trial.kept && plans[p].steps > 0 && referee_.knows(points_[p].strained.origin) &&
+                    drawn(drawn_++) < compact_.check_share;
+  }
+  give_cells(std::move(last));
+}
+
+/// A cell for each trial that has to be made; those of the last trials that are not kept are free again.
+void CompactVolumeElements::give_cells(std::vector<Trial> last) {
+  for (Trial& trial : last) spare_.push_back(std::move(trial.cell));
+  std::erase_if(spare_, [](const Cell& cell) { return cell == nullptr || cell.use_count() > 1; });
+  for (Trial& trial : trials_) {
+    if (trial.from != nullptr && !trial.kept) trial.cell = spare_cell();
   }
 }
 
@@ -172,19 +194,31 @@ void CompactVolumeElements::in_parallel(std::size_t count, Work work) const {
 
 void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
   if (trial.cell == nullptr) return;
-  const Point& point = points_[trial.first];
+  if (trial.kept) {
+    for (const char* spent : {"dem_steps", "seconds", "engine_seconds"}) trial.report[spent] = 0;
+  } else {
+    deform(trial);
+  }
+  if (trial.failure) return;
+  trial.found.stiffness.reset();
+  if (wanted == Operator::elastic)
+    trial.found.stiffness = Eigen::Map<const Tensor4>(trial.cell->stiffness(options_.relaxed).data());
+}
+
+void CompactVolumeElements::deform(Trial& trial) const {
   CompactCell& cell = *trial.cell;
-  cell = *point.cell;
+  cell = *trial.from;
   const CompactCell::Sampling sampling =
       answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
                              : CompactCell::Sampling{};
-  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, trial.straining.steps, sampling);
+  const long steps = trial.straining.steps;
+  if (options_.start_at_rest && steps > 0) cell.rest();
+  const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, steps, sampling);
   trial.failure = end.failure;
+  if (!trial.failure && steps > 0) trial.failure = cell.hold(options_.hold_steps);
   if (trial.failure) return;
   trial.report = cell.trial_report();
   trial.found = {tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
-  if (wanted == Operator::elastic)
-    trial.found.stiffness = Eigen::Map<const Tensor4>(cell.stiffness(options_.relaxed).data());
 }
 
 void CompactVolumeElements::check(const Trial& trial) {
@@ -264,10 +298,11 @@ void CompactVolumeElements::load(const SavedStates& states) {
   for (std::size_t p = 0; p < size(); ++p) {
     auto entry = known.find(states[p]);
     if (entry == known.end()) entry = known.emplace(states[p], point_of(states[p])).first;
+    require_origin(entry->second.strained.origin, points_[p].strained.origin);
     loaded.push_back(entry->second);
-    loaded.back().strained.origin = points_[p].strained.origin;
   }
   points_ = std::move(loaded);
+  trials_.clear();
   trial_pending_ = false;
 }
 

@@ -26,6 +26,7 @@ struct EngineDiffers : std::runtime_error {
 
 /// The volume elements of ONE rank as compact cells, strained by its threads. Points with equal histories (same start,
 /// stretches equal up to kQuantum since then) share one cell; the first trial in which they part gives each its own.
+/// What the last trial has strained already is not strained again (its report counts no steps): equal F, equal bits.
 /// Results depend neither on the number of threads nor on which points a rank holds.
 class CompactVolumeElements : public LocalPoints {
  public:
@@ -58,7 +59,9 @@ class CompactVolumeElements : public LocalPoints {
   /// What one cell is asked for by one or more points.
   struct Trial {
     Cell cell;
-    std::size_t first = 0;  ///< of its points
+    const CompactCell* from = nullptr;  ///< the committed one; none: refused
+    bool kept = false;                  ///< it is the last trial's
+    std::size_t first = 0;              ///< of its points
     Straining straining;
     std::optional<std::string> failure;
     Strained found;
@@ -71,7 +74,9 @@ class CompactVolumeElements : public LocalPoints {
   Cell spare_cell();
   std::vector<std::size_t> longest_first() const;
   void group(const std::vector<Straining>& plans);
+  void give_cells(std::vector<Trial> last);
   void strain(Trial& trial, Operator wanted) const;
+  void deform(Trial& trial) const;
   void check(const Trial& trial);
   template <class Work>
   void in_parallel(std::size_t count, Work work) const;

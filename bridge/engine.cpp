@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 
 namespace py = pybind11;
@@ -58,7 +59,8 @@ Engine::Engine(const std::string& name, const std::string& python_path) : interp
     throw std::runtime_error("engine '" + name + "': expected module:class, such as volume_element:Engine");
   in_python([&] {
     const py::list fields = py::cast(std::vector<std::string>(kReportFields.begin(), kReportFields.end()));
-    py::module_::import("sys").attr("path").attr("insert")(0, FEMXDEM_PYTHON_MODULES);
+    const auto beside = std::filesystem::read_symlink("/proc/self/exe").parent_path();  // the modules lie there
+    py::module_::import("sys").attr("path").attr("insert")(0, beside.string());
     py::module_::import("sys").attr("path").attr("insert")(0, python_path);
     py::module_ module = py::module_::import(name.substr(0, colon).c_str());
     engine_ = module.attr(name.substr(colon + 1).c_str())(fields);

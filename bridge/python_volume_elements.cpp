@@ -193,10 +193,7 @@ void PythonVolumeElements::load(const SavedStates& states) {
     const VeState state =
         decode(states[i]).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, states[i]});
     const bool compact = state.engine == EngineKind::compact;
-    if (compact && state.origin != point.origin)
-      throw UserError(
-          "checkpoint: a volume element was made from another packing than the case's; restart with the packings that "
-          "it was run with (ve.cache)");
+    if (compact) require_origin(state.origin, point.origin);
     worker_.request(compact ? Command::write_back : Command::load, static_cast<std::int64_t>(i), 0,
                     compact ? CompactCell::load(state.bytes).to_scene() : state.bytes);
     points_[i].reference_time_scale = state.reference_time_scale;

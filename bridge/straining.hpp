@@ -23,9 +23,11 @@ struct VolumeElementOptions {
   /// Where in the trial its stress belongs: 1, at its end; 1/2 to 2/3: it is the mean over the trial, which belongs
   /// there (later ones weigh more beyond 1/2: 1 + late (2 t / T - 1)) [-].
   double answer_at = 1;
-  bool relaxed = false;    ///< the elastic stiffness is the relaxed one, not Eq. (2)
-  bool quantised = false;  ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
-  bool serialise = false;  ///< YADE's volume elements are saved and restored at every trial, not forked
+  bool relaxed = false;        ///< the elastic stiffness is the relaxed one, not Eq. (2)
+  bool quantised = false;      ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
+  bool serialise = false;      ///< YADE's volume elements are saved and restored at every trial, not forked
+  bool start_at_rest = false;  ///< a trial forgets the velocities of its start (compact cells)
+  int hold_steps = 0;          ///< DEM steps at the end of a trial that strains, without deformation (compact cells)
   /// Where remarks go: a trial that was repeated, a fork that was refused.
   std::function<void(std::string_view)> say = [](std::string_view) {};
 };

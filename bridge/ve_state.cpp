@@ -57,4 +57,11 @@ std::optional<VeState> decode(std::string_view bytes) {
   }
 }
 
+void require_origin(std::uint64_t saved, std::uint64_t of_case) {
+  if (saved == of_case) return;
+  throw UserError(
+      "checkpoint: a volume element was made from another packing than the case's; restart with the packings that it "
+      "was run with (ve.cache)");
+}
+
 }  // namespace femxdem

@@ -26,5 +26,7 @@ std::string encode(const VeState& state);
 /// Nothing where the bytes have not the mark: an engine's own state, of a volume element as it was made. Throws
 /// UserError for bytes that are damaged or of another version.
 std::optional<VeState> decode(std::string_view bytes);
+/// Throws UserError for a saved state of another origin than the case's volume element.
+void require_origin(std::uint64_t saved, std::uint64_t of_case);
 
 }  // namespace femxdem

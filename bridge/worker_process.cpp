@@ -19,6 +19,7 @@
 #include <system_error>
 
 #include "errors.hpp"
+#include "locations.hpp"
 #include "mailbox.hpp"
 
 namespace femxdem {
@@ -27,12 +28,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 std::system_error system_error(const char* what) { return {errno, std::generic_category(), what}; }
-
-std::filesystem::path find_executable(const std::filesystem::path& given) {
-  if (!given.empty()) return given;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "femxdem-worker";
-  return std::filesystem::exists(beside) ? beside : std::filesystem::path(FEMXDEM_WORKER);
-}
 
 /// Environment of the worker: one thread, nothing of our MPI, nothing that moves Python's own folders. CHOLMOD asks
 /// OpenMP for four threads whatever OMP_NUM_THREADS says, and a trial, being a fork, waits for ever for those of its
@@ -47,6 +42,7 @@ std::vector<std::string> worker_environment(bool sorted_contacts) {
       ours = ours || text.starts_with(prefix);
     if (!ours) kept.emplace_back(text);
   }
+  if (std::getenv("FEMXDEM_YADE_DIR") == nullptr) kept.emplace_back("FEMXDEM_YADE_DIR=" FEMXDEM_YADE_DIR);
   if (std::getenv("HOME") == nullptr) kept.emplace_back("HOME=/tmp");  // YADE's modules look for it
   kept.emplace_back("OMP_NUM_THREADS=1");
   kept.emplace_back("OMP_THREAD_LIMIT=1");
@@ -95,8 +91,8 @@ std::string describe_wait_status(std::int64_t status) {
 }
 
 WorkerProcess::WorkerProcess(WorkerCommand command) : command_(std::move(command)) {
-  command_.executable = find_executable(command_.executable);
-  if (command_.python_path.empty()) command_.python_path = FEMXDEM_YADE_SCRIPTS;
+  if (command_.executable.empty()) command_.executable = locations().worker;
+  if (command_.python_path.empty()) command_.python_path = locations().yade_scripts;
   if (access(command_.executable.c_str(), X_OK) != 0)
     throw UserError(fmt::format("worker '{}': no such program; build it (setup.sh build) or name another",
                                 command_.executable.string()));

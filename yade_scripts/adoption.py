@@ -6,7 +6,7 @@ cell from then on.
 """
 
 from archive_check import refuse_not_finite
-from contact_laws import resting_time_step
+from contact_laws import resting_time_step, to_forces
 
 KEPT = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator")
 DROPPED = (  # with everything derived from them
@@ -175,10 +175,7 @@ def _reset(O, integrator):
         done.append("velocity gradient of the cell set to zero")
         O.cell.velGrad = Matrix3.Zero
     O.dt = resting_time_step(O)
-    O.subStepping = True
-    for _ in range(len(O.engines)):
-        O.step()  # the forces alone: what is not a number must not move the grains, or YADE's collider ends the process
-    O.subStepping = False
+    to_forces(O)  # these alone: what is not a number must not move the grains, or YADE's collider ends the process
     refuse_not_finite(O, "as its maker left it")
     O.step()  # YADE applies a new velocity gradient in the integrator: one step that takes no time
     O.dt = 0.0

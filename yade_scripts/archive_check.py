@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact_loop import contacts
+
 TOLERANCE = 1e-6  # relative; a restored scene repeats itself to 1e-13
 
 
@@ -96,6 +98,41 @@ def refuse_lost_grains(O):
             f"The positions of {len(lost)} bodies of the YADE scene, body {lost[0]} among them, are not numbers: its "
             "simulation has diverged; lower O.dt in the script."
         )
+
+
+def refuse_other_forces(O):
+    """Raises ValueError where other forces act on grains at rest than those that their contacts tell as normalForce and
+    shearForce, or YADE's stress is not the sum of these: the stress of the volume element would be wrong without a word.
+    (Capillary bridges; laws that keep their forces with the opposite sign.)"""
+    now = state(O)
+    forces = now.normal + now.shear
+    scale = _positive(np.linalg.norm(forces))
+    told = np.zeros((len(O.bodies), 3))
+    for (first, second), f in zip(now.pairs, forces):
+        told[first] -= f
+        told[second] += f
+    acting = np.array([O.forces.f(id) for id in range(len(O.bodies))])
+    off = {"those that act on the grains": np.linalg.norm(acting - told) / scale}
+    if not any(b.isClump for b in O.bodies):
+        off["YADE's stress"] = _distance_of_stress(O, now, forces)
+    parts = [f"{what} by {size:.1e}" for what, size in off.items() if not size <= TOLERANCE]
+    if not parts:
+        return
+    turned = np.linalg.norm(acting + told) <= TOLERANCE * scale
+    why = "are kept with the opposite sign: they differ from " if turned else "are not all that act between its grains: they differ from "
+    raise ValueError(
+        f"The normalForce and shearForce of the contacts of this scene (law {law_names(O)}) {why}{' and from '.join(parts)} "
+        f"(relative, limit {TOLERANCE:.0e}). The stress of a volume element is their sum: use another law."
+    )
+
+
+def _distance_of_stress(O, now, forces):
+    """How far YADE's stress is from that of the contacts' `forces` (m, 3), relative."""
+    c = contacts(O)
+    of_pair = dict(zip(now.pairs, forces))
+    f = np.array([of_pair[tuple(pair)] for pair in c.ids.tolist()])
+    stress = -np.einsum("ci,cj->ij", f, c.normal * c.length[:, None]) / O.cell.volume
+    return np.linalg.norm(stress - now.stress) / _positive(np.linalg.norm(stress))
 
 
 UNREST = 0.2  # unbalanced force of a scene that is not one in equilibrium

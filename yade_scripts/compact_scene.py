@@ -5,7 +5,7 @@ export is told in bridge/compact_scene.hpp.
 """
 
 import math
-from operator import attrgetter, methodcaller
+from operator import attrgetter
 
 import numpy as np
 
@@ -14,8 +14,8 @@ import unit_of_time
 
 LATER = 1 << 62  # a step number after the last look for new contacts, whenever that was
 MAGIC = b"fxdscene"
-VERSION = 1
-COHESIVE, FRICTION = 0, 1
+VERSION = 2
+COHESIVE, FRICTION, PAPER = 0, 1, 2
 LAWS = {
     ("ScGeom6D", "CohFrictPhys", "Law2_ScGeom6D_CohFrictPhys_CohesionMoment"): COHESIVE,
     ("ScGeom", "FrictPhys", "Law2_ScGeom_FrictPhys_CundallStrack"): FRICTION,
@@ -129,7 +129,7 @@ def _different(what, values):
 
 def export(O):
     """Everything of the scene, which covered(O) has found good, as bytes for compact_cell.CompactCell.from_scene."""
-    law = LAWS[_kind(O.engines[2])]
+    law = LAWS[_kind(O.engines[2])] if contact_laws.paper_law(O) is None else PAPER
     contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
     safety = contact_laws.time_step_safety(O)
     follows = safety is not None and contact_laws.constant_stiffness(O) is None
@@ -148,6 +148,21 @@ def cell(O):
     return compact_cell.CompactCell.from_scene(export(O))
 
 
+def stress(O):
+    """(3, 3) Cauchy stress [Pa] of a covered scene, symmetric, with the bits of compact cells (love_weber of
+    bridge/compact_report.cpp): the same operations, contacts in the order of the spheres' numbers."""
+    contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
+    phys, x = [i.phys for i in contacts], _vectors([b.state for b in O.bodies], "pos")
+    i, j = (_scalars(contacts, name).astype(int) for name in ("id1", "id2"))
+    H, shift = np.array(O.cell.hSize).reshape(3, 3), np.array([list(c.cellDist) for c in contacts], float).reshape(-1, 3)
+    images = H[:, 0] * shift[:, :1] + (H[:, 1] * shift[:, 1:2] + H[:, 2] * shift[:, 2:])
+    force, branch = _vectors(phys, "normalForce") + _vectors(phys, "shearForce"), (x[i] - x[j]) - images
+    s = np.zeros((3, 3))
+    if contacts:  # cumsum adds one after the other
+        s = np.cumsum(force[:, :, None] * branch[:, None, :], axis=0)[-1] / O.cell.volume
+    return 0.5 * (s + s.T)
+
+
 def _numbers(O, law, safety):
     newton, cell, physics, unit = O.engines[-1], O.cell, O.engines[2].physDispatcher.functors[0], unit_of_time.of(O).in_a_second
     L = cell.nextVelGrad if cell.velGradChanged else cell.velGrad  # a new one waits for the integrator
@@ -159,7 +174,7 @@ def _numbers(O, law, safety):
     scene_density = float(np.mean([b.mat.density for b in O.bodies]))
     diameter = 2 * float(np.array([b.shape.radius for b in O.bodies]).mean())
     solid = sum(b.state.mass for b in O.bodies) / scene_density
-    last = [safety, scene_density / unit**2, diameter, solid]
+    last = [safety, scene_density / unit**2, diameter, solid, contact_laws.paper_law(O) or 0.0]
     return np.concatenate([[O.dt / unit, newton.damping], *tensors, new, constants, last])
 
 
@@ -189,7 +204,7 @@ def _contact_arrays(O, law, contacts):
     shift = np.array([list(i.cellDist) for i in contacts], dtype=np.int64).reshape(m, 3)
     names = ("normalAdhesion", "shearAdhesion", "unp", "unpMax")
     cohesive = {name: np.zeros(m) for name in (*names, "fragile", "cohesionBroken")}
-    if law == COHESIVE:
+    if law != FRICTION:
         cohesive = {name: _scalars(phys, name) for name in cohesive}
     kn, normal = _scalars(phys, "kn"), _vectors(geom, "normal")
     overlap = _scalars(geom, "penetrationDepth")
@@ -239,7 +254,7 @@ class Scene:
         self.version, self.law, n, m, self.iteration, starts = (int(k) for k in self._take(6))
         self.time_step, self.damping = self._floats(2)
         self.H, self.trsf, self.L, self.previous_L = self._floats(36).reshape(4, 3, 3)
-        self.constants = self._floats(8)
+        self.constants = self._floats(9)
         for name, width in self.SPHERES.items():
             setattr(self, name, self._rows(n, width))
         self.ids, self.shift = self._take(2 * m).reshape(m, 2), self._take(3 * m).reshape(m, 3)
@@ -310,10 +325,7 @@ def _matrix(T):
 def _again(O):
     """From rest to rest without time: positions stay, contacts are found anew."""
     O.step()
-    O.subStepping = True
-    for _ in O.engines:
-        O.step()
-    O.subStepping = False
+    contact_laws.to_forces(O)
 
 
 def _enlargement(scene):
@@ -346,7 +358,7 @@ def _matched(O, scene):
 
 
 def _set_contacts(contacts, scene, what):
-    cohesive = scene.law == COHESIVE
+    cohesive = scene.law != FRICTION
     for at, i in enumerate(contacts):
         p = i.phys
         if what == "forces":

@@ -9,15 +9,21 @@ delta is the overlap, forces are compression positive; mu is the friction, f_c t
 "bonded"    f_n = kn delta down to -f_c, |f_t| <= mu (f_n + f_c), until it first slides or opens: then the bond is gone
             and the contact is one of friction.
 "friction"  f_n = kn delta, |f_t| <= mu f_n: cheaper, no adhesion.
+"paper"     the adhesive law without the deviations: f_n = kn delta - f_c and |f_t| <= mu kn delta while the overlap
+            lasts, which ends the contact. YADE has it not: it prepares the packing with "adhesive", which is the same
+            between spheres that overlap (unp = f_c/kn) but for contacts that slide under attraction; the packing then
+            comes to rest in a compact cell (packing.py), which alone strains it. A dashpot of the normal may be added:
+            f_el = max(0, kn delta + c d(delta)/dt) for kn delta, c over the critical one of the pair being
+            ve.viscous_damping.
 
-Contacts that form later have no adhesion, in all three; the adhesive law can give it to them too, see
-make_new_contacts_adhesive.
+Contacts that form later have no adhesion, in all of them; the adhesive law can give it to them too, see
+make_new_contacts_adhesive, the paper's from the first touch on.
 """
 
 import math
 
-LAWS = ("adhesive", "bonded", "friction")
-NEW_CONTACTS = ("frictional", "adhesive")
+LAWS = ("adhesive", "bonded", "friction")  # of YADE
+PAPER = "paper"
 EVERY = 4  # DEM steps between two looks for new contacts
 FINITE_WITHOUT_TIME = {
     "Law2_ScGeom_FrictPhys_CundallStrack",
@@ -28,6 +34,7 @@ ADHESION_TAG = "femxdem_adhesion_of_new_contacts"
 LOOKS_TAG = "femxdem_looks_for_new_contacts"
 STIFFNESS_TAG = "femxdem_constant_stiffness"
 SAFETY_TAG = "femxdem_time_step_safety"
+PAPER_TAG = "femxdem_paper_law"
 
 
 def engines(law, kn, kt, damping):
@@ -137,6 +144,17 @@ def looks_for_new_contacts(O):
     return (int(noted[0]), int(noted[1])) if noted else (0, O.iter - 2 * EVERY)
 
 
+def note_paper_law(O, viscous_damping):
+    """Notes in the scene that its contacts have the paper's law, with dashpots of that ratio of the critical damping."""
+    _note(O, PAPER_TAG, float(viscous_damping))
+
+
+def paper_law(O):
+    """The ratio of the scene's note, or None: the law is YADE's."""
+    noted = _noted(O, PAPER_TAG)
+    return noted and noted[0]
+
+
 def note_time_step_safety(O, safety):
     """Notes in the scene that its time step is `safety` times the critical one of its contact network."""
     _note(O, SAFETY_TAG, safety)
@@ -157,21 +175,32 @@ def _noted(O, tag):
 
 
 def run(O, steps, new_adhesion):
-    """`steps` DEM steps. With new_adhesion = (f_c, friction), the contacts that have formed since the last look become
-    adhesive at every step number divisible by EVERY: by the scene's own count (steps_made), so that no split and no
-    restart moves it."""
-    step = O.step
+    """`steps` DEM steps. Before the cell moves, one that has become long flips, by YADE's own Cell.flipCell (its
+    flipFlippable flips after the move, and not in a step that is made part by part). With new_adhesion = (f_c, friction),
+    the contacts that have formed since the last look become adhesive at every step number divisible by EVERY: by the
+    scene's own count (steps_made), so that no split and no restart moves it."""
+    step, flip = O.step, O.cell.flipCell
     if not new_adhesion:
         for _ in range(steps):
             step()
+            flip()
         return
     added, last = looks_for_new_contacts(O)
     for _ in range(steps):
         step()
+        flip()
         if (O.iter - added) % EVERY == 0:
             add_adhesion("adhesive", [i for i in O.interactions if i.iterMadeReal >= last], *new_adhesion)
             last = O.iter
     _note(O, LOOKS_TAG, added, last)
+
+
+def to_forces(O):
+    """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
+    O.subStepping = True
+    for _ in range(len(O.engines)):
+        O.step()
+    O.subStepping = False
 
 
 def loop_in_order(O):

@@ -122,19 +122,6 @@ def relaxed_stiffness(c, kn, kt, volume):
     return stiffness(c, kn, kt, volume) - released[PLACE[:, :, None, None], PLACE]
 
 
-def one_tangent_stiffness(c, kn, kt, shear, volume):
-    """YADE's getStressAndTangent: (6, 6) [Pa] in Voigt order xx, yy, zz, yz, zx, xy, with the one tangent along the
-    current shear force `shear` (m, 3) and none where it vanishes (Kruyt and Rothenburg 1998)."""
-    size = np.linalg.norm(shear, axis=1, keepdims=True)
-    t = np.divide(shear, size, out=np.zeros_like(shear), where=size > 0)
-    i, j = np.array([0, 1, 2, 1, 2, 0]), np.array([0, 1, 2, 2, 0, 1])
-    S = np.zeros((6, 6))
-    for k, direction in ((kn, c.normal), (kt, t)):
-        b = 0.5 * (direction[:, i] * c.normal[:, j] + direction[:, j] * c.normal[:, i]) * c.length[:, None]
-        S += b.T @ (k[:, None] * b) / volume
-    return S
-
-
 def at_coulomb_limit(c, radius):
     """(m,) whether a contact slides: its shear force is at the limit of its law, within 1e-6 of it.
 

@@ -68,20 +68,20 @@ def _serve(question, reply, answer):
         os._exit(0)
 
 
-def own(O, to_forces):
+def own(O):
     """The Copy of a scene before adoption; its question: (time step, velocity gradient (3, 3), steps), in the
     scene's unit of time; its answer:
     {"as it was left": State, "at rest": State}, with and without the velocities of its grains."""
-    return Copy(lambda question: _both(O, to_forces, *question))
+    return Copy(lambda question: _both(O, *question))
 
 
-def _both(O, to_forces, time_step, L, steps):
-    left = Copy(lambda _: _go_on(O, to_forces, time_step, L, steps, False))
-    at_rest = _go_on(O, to_forces, time_step, L, steps, True)
+def _both(O, time_step, L, steps):
+    left = Copy(lambda _: _go_on(O, time_step, L, steps, False))
+    at_rest = _go_on(O, time_step, L, steps, True)
     return {"as it was left": left.ask(None), "at rest": at_rest}
 
 
-def _go_on(O, to_forces, time_step, L, steps, at_rest):
+def _go_on(O, time_step, L, steps, at_rest):
     """The scene's own engines but for those that strain, stop or record; gravity stays unless it is to be at rest."""
     from yade._utils import calm
     from yade.utils import Matrix3
@@ -95,10 +95,10 @@ def _go_on(O, to_forces, time_step, L, steps, at_rest):
         calm()
         O.cell.homoDeform = 2
     O.dt = time_step
-    to_forces()
+    contact_laws.to_forces(O)
     O.cell.velGrad = Matrix3(*L.ravel())
     contact_laws.run(O, steps, contact_laws.adhesion_of_new_contacts(O))
-    to_forces()
+    contact_laws.to_forces(O)
     return archive_check.state(O)
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+import compact_scene
 import contact_laws
 import unit_of_time
 
@@ -19,17 +20,21 @@ MAX_STEPS = 400_000
 
 def prepare(O, spec):
     """Makes the packing in YADE's current scene `O`, isotropic to confining_stress and at rest. `spec` is the whole [ve]
-    table of a case: `femxdem parameters` has its units, and the only defaults.
+    table of a case, which has checked it: `femxdem parameters` has its units, bounds, and the only defaults.
 
     Adhesion is put in at sigma_0. A bond changes no force. The adhesive law adds -f_c to every contact; so the radii
     are smaller by f_c/(2 kn) until then, and restoring them moves every overlap by f_c/kn, which balances it.
-    Raises ValueError on senseless values and RuntimeError when equilibrium is not reached.
+    The paper's law comes to rest in a compact cell at the end: the scene holds its places, contacts and forces.
+    Raises RuntimeError when equilibrium is not reached.
     """
-    p = _checked(dict(spec))
+    p = dict(spec)
     unit = unit_of_time.suited(p["confining_stress"], p["density"], p["spheres"])
     unit_of_time.note(O, unit)
     p["density"] = unit.scene_density(p["density"])  # all times and rates of the scene follow from it
     rng = np.random.default_rng(p["seed"])
+    paper = p["contact_law"] == contact_laws.PAPER
+    if paper:
+        p["contact_law"] = "adhesive"  # the nearest that YADE has
     sigma, a, law = p["confining_stress"], p["mean_diameter"], p["contact_law"]
     kn, f_c = p["kappa"] * sigma * a, p["cohesion"] * sigma * a * a
     diameters = rng.uniform(1.0, p["size_ratio"], p["spheres"])
@@ -52,26 +57,27 @@ def prepare(O, spec):
         while contact_laws.add_adhesion(law, O.interactions, f_c, p["friction"]):
             servo.settle(ROUGH)
     servo.settle()
+    if paper:
+        _settle_papers_law(O, p, kn, f_c)
     if p["new_contacts"] == "adhesive":
         contact_laws.make_new_contacts_adhesive(O, f_c, p["friction"])
     O.engines[-1].damping = p["damping"]
     O.interactions.serializeSorted = True  # contacts come back from a saved scene in the order of the spheres
 
 
-def _checked(p):
-    if p["contact_law"] not in contact_laws.LAWS:
-        known = ", ".join(contact_laws.LAWS)
-        raise ValueError(f"ve.contact_law = \"{p['contact_law']}\" is unknown: use one of {known}.")
-    if p["cohesion"] > 0 and p["contact_law"] == "friction":
-        raise ValueError("ve.cohesion > 0 needs ve.contact_law = \"adhesive\" or \"bonded\"; \"friction\" has none.")
-    if p["new_contacts"] not in contact_laws.NEW_CONTACTS:
-        known = ", ".join(contact_laws.NEW_CONTACTS)
-        raise ValueError(f"ve.new_contacts = \"{p['new_contacts']}\" is unknown: use one of {known}.")
-    if p["new_contacts"] == "adhesive" and not (p["contact_law"] == "adhesive" and p["cohesion"] > 0):
-        raise ValueError('ve.new_contacts = "adhesive" needs ve.contact_law = "adhesive" and ve.cohesion > 0.')
-    if p["cohesion"] < 0 or p["spheres"] < 20 or p["size_ratio"] < 1 or p["kappa"] <= 0 or p["stiffness_ratio"] <= 0:
-        raise ValueError("ve needs spheres >= 20, size_ratio >= 1, kappa > 0, stiffness_ratio > 0 and cohesion >= 0.")
-    return p
+def _settle_papers_law(O, p, kn, f_c):
+    """Brings the packing to rest at sigma_0 under the paper's law, in a compact cell without dashpots; contacts that form
+    meanwhile become adhesive. Leaves the scene inside a step, after its contact forces."""
+    contact_laws.note_paper_law(O, 0.0)
+    contact_laws.to_forces(O)
+    servo = _CompactServo(O, p, kn)
+    while True:
+        servo.settle()
+        compact_scene.write_back(O, servo.cell.to_scene())
+        if f_c == 0 or not contact_laws.add_adhesion("adhesive", O.interactions, f_c, p["friction"]):
+            break
+        servo.take_over()
+    contact_laws.note_paper_law(O, p["viscous_damping"])
 
 
 def _loose_cell(O, p, kn, side, positions, radii):
@@ -140,12 +146,15 @@ class _Servo:
         self.rate = 0.02 * math.sqrt(self.sigma / p["density"]) / p["mean_diameter"]  # inertial number 0.02
         self.steps = 0
 
-    def _strain(self, rate):
+    def _go(self, rate):
         from yade.utils import Matrix3
 
         self.O.cell.velGrad = Matrix3(*rate.ravel())
         for _ in range(self.EVERY):
             self.O.step()
+
+    def _strain(self, rate):
+        self._go(rate)
         self.steps += self.EVERY
         if self.steps > MAX_STEPS:
             raise RuntimeError(
@@ -175,3 +184,19 @@ class _Servo:
             rate = -e * self.sigma / (self.modulus * self.relaxation)
             self._strain(np.clip(rate, -self.rate, self.rate))
         self._strain(np.zeros((3, 3)))
+
+
+class _CompactServo(_Servo):
+    """The same for a law that only the compact cell of the scene has."""
+
+    def __init__(self, O, p, kn):
+        super().__init__(O, p, kn)
+        self.take_over()
+
+    def take_over(self):
+        """Goes on from what the scene is now."""
+        self.cell = compact_scene.cell(self.O)
+        self.stress, self.unbalanced = self.cell.stress, self.cell.unbalanced_force
+
+    def _go(self, rate):
+        self.cell.deform(rate * unit_of_time.of(self.O).in_a_second, self.EVERY)

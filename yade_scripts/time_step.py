@@ -22,10 +22,11 @@ def set_time_step(O, own, safety):
     if has_stiffness(O, c) and not clumped:
         critical = critical_time_step(O, c)
         damping = viscosity.damping_ratio(O, critical, own)
-        O.dt = safety * viscosity.damped(critical, damping)
+        papers = 0.25 * critical * _papers_dashpots(O, c)
+        O.dt = safety * viscosity.damped(critical, damping + papers)
         contact_laws.note_time_step_safety(O, safety)
         viscosity.note(O, damping)
-        return "contact network with its dashpots" if damping > 0 else "contact network"
+        return "contact network with its dashpots" if damping + papers > 0 else "contact network"
     waves = safety * PWaveTimeStep()
     if not clumped:
         waves = safety * viscosity.damped(waves / safety, viscosity.damping_ratio(O, waves / safety, own))
@@ -52,14 +53,29 @@ def critical_time_step(O, c):
     Power iteration on M^-1 K; K holds kn along the normal and kt across it, acting on
     u_j - u_i - (r_i theta_i + r_j theta_j) x n. Its estimate of omega_max comes from below, within some per cent.
     """
+    return 2 / np.sqrt(_largest_eigenvalue(O, c, values(c, "kn"), values(c, "ks"), rolling.stiffness(c)))
+
+
+def _papers_dashpots(O, c):
+    """Largest eigenvalue of M^-1 C [1/s] of the dashpots of the paper's law, which YADE has not: see viscosity.damping_ratio."""
+    ratio = contact_laws.paper_law(O)
+    if not ratio:
+        return 0.0
+    mass, _, _ = _masses(O)
+    pair = 1 / (1 / mass[c.ids]).sum(axis=1)
+    constants = 2 * ratio * np.sqrt(values(c, "kn") * pair)
+    return _largest_eigenvalue(O, c, constants, 0 * constants, None)
+
+
+def _largest_eigenvalue(O, c, kn, kt, turning):
+    """Of M^-1 K, K of contacts with kn along the normal and kt (m,) across it, and `turning` of rolling.py."""
     mass, inertia, radius = _masses(O)
     i, j = c.ids.T
-    n, kn, kt = c.normal, values(c, "kn")[:, None], values(c, "ks")[:, None]
+    n, kn, kt = c.normal, kn[:, None], kt[:, None]
     ri, rj = radius[i][:, None], radius[j][:, None]
-    turning = rolling.stiffness(c)
     rng = np.random.default_rng(0)
     u, w = rng.standard_normal((2, len(mass), 3))
-    omega2 = 0.0
+    largest = 0.0
     for _ in range(ITERATIONS):
         d = u[j] - u[i] - _cross(ri * w[i] + rj * w[j], n)
         dn = np.einsum("ci,ci->c", d, n)[:, None] * n
@@ -71,11 +87,11 @@ def critical_time_step(O, c):
             m = rolling.moments(c, turning, w)
             torque = torque + _sums(np.concatenate([j, i]), np.concatenate([m, -m]), len(mass))
         energy = (u * force).sum() + (w * torque).sum()  # 2 x potential, over 2 x kinetic: Rayleigh's quotient
-        omega2 = energy / ((mass[:, None] * u * u).sum() + (inertia[:, None] * w * w).sum())
+        largest = energy / ((mass[:, None] * u * u).sum() + (inertia[:, None] * w * w).sum())
         u, w = force / mass[:, None], torque / inertia[:, None]
         size = np.sqrt((u * u).sum())
         u, w = u / size, w / size
-    return 2 / np.sqrt(omega2)
+    return largest
 
 
 def _cross(a, b):

@@ -39,6 +39,30 @@ def run_script(O, path, arguments, steps, seconds):
     """
     if not Path(path).is_file():
         raise ValueError(f've.script = "{path}": no such file.')
+    names = _main_module(O, path, arguments)
+    here, notes, run_calls, graphics = os.getcwd(), [], [], drop_nothings(O)
+    undo = [_limit_steps(O, steps, run_calls), catch_exits(O), graphics]
+    with recorded(O, path) as recorder:
+        try:
+            _run_it(O, path, names, run_calls, seconds, notes)
+        finally:
+            while O.running:
+                O.pause()
+                time.sleep(0.05)
+            for back in undo:
+                back()
+            os.chdir(here)
+    if graphics.dropped:
+        notes.append(f"{graphics.dropped} engines of the graphics were left out")
+    if recorder.programs:
+        notes.append(f"the script started {recorder.programs[0]}: what other programs read is not followed")
+    if O.iter >= steps:
+        notes.append(f"the script's simulation was stopped after {steps} steps")
+    return notes, recorder.inputs
+
+
+def _main_module(O, path, arguments):
+    """Makes __main__, its arguments and its surroundings what `yade -n path arguments...` has; the names of __main__."""
     os.environ["MPLBACKEND"] = "Agg"
     os.environ.setdefault("HOME", tempfile.gettempdir())  # yade.plot and Matplotlib look for it
     close_windows()
@@ -46,47 +70,34 @@ def run_script(O, path, arguments, steps, seconds):
     names.update(_namespace(O), __file__=str(path))
     sys.argv = [str(path), *arguments]
     _prepare_runtime(sys.argv)
-    notes = []
-    here = os.getcwd()
     sys.path.insert(0, str(Path(path).resolve().parent))
     sys.last_value = None  # where Python leaves the error of a hook, which YADE only reports as one of its own
-    run_calls = []
-    undo = [_limit_steps(O, steps, run_calls), catch_exits(O), drop_nothings(O)]
+    return names
+
+
+def _run_it(O, path, names, run_calls, seconds, notes):
+    """Runs the script, and its simulation where that goes on or has never begun; adds to `notes` what was special."""
     clock = threading.Timer(seconds, _interrupt, (O, threading.get_ident()))
     clock.daemon = True
     clock.start()
-    with recorded(O, path) as recorder:
-        try:
-            exec(compile(Path(path).read_bytes(), str(path), "exec"), names)
-            if O.iter == 0 and not run_calls and O.engines:
-                notes.append("the script did not start its simulation: run until its own hooks paused it")
-                O.run()
-            if O.running:
-                O.wait()
-        except _EnoughSteps:
-            pass
-        except _TimeUp:
-            notes.append(f"the script's simulation was stopped after {seconds:g} s")
-        except (Exception, KeyboardInterrupt, SystemExit, Left) as error:
-            if not left(error):
-                raise _failure(path, error) from error
-            in_hook = not isinstance(error, (Left, SystemExit))
-            notes.append("the script called exit" + (" in one of its hooks: adopted as it was then" if in_hook else ""))
-        finally:
-            clock.cancel()
-            while O.running:
-                O.pause()
-                time.sleep(0.05)
-            for back in undo:
-                back()
-            os.chdir(here)
-    if undo[2].dropped:
-        notes.append(f"{undo[2].dropped} engines of the graphics were left out")
-    if recorder.programs:
-        notes.append(f"the script started {recorder.programs[0]}: what other programs read is not followed")
-    if O.iter >= steps:
-        notes.append(f"the script's simulation was stopped after {steps} steps")
-    return notes, recorder.inputs
+    try:
+        exec(compile(Path(path).read_bytes(), str(path), "exec"), names)
+        if O.iter == 0 and not run_calls and O.engines:
+            notes.append("the script did not start its simulation: run until its own hooks paused it")
+            O.run()
+        if O.running:
+            O.wait()
+    except _EnoughSteps:
+        pass
+    except _TimeUp:
+        notes.append(f"the script's simulation was stopped after {seconds:g} s")
+    except (Exception, KeyboardInterrupt, SystemExit, Left) as error:
+        if not left(error):
+            raise _failure(path, error) from error
+        in_hook = not isinstance(error, (Left, SystemExit))
+        notes.append("the script called exit" + (" in one of its hooks: adopted as it was then" if in_hook else ""))
+    finally:
+        clock.cancel()
 
 
 def _failure(path, error):

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 import contact_laws
+from continuation import Copy
 
 DAMPING_TAG = "femxdem_damping_ratio"
 ITERATIONS = 30
@@ -39,8 +40,6 @@ def damping_ratio(O, critical, own):
 
     `own` [s]: the scene's time step, for laws that divide by it. Done in a forked process: the scene is not touched.
     """
-    from continuation import Copy
-
     return 0.25 * critical * Copy(lambda step: _largest_eigenvalue(O, step)).ask(own if own > 0 else 0.1 * critical)
 
 
@@ -82,10 +81,7 @@ def _forces(O, grains, rest, v, w):
     O.step()
     for b, velocity, spin in zip(grains, v, w):
         b.state.vel, b.state.angVel = Vector3(*velocity), Vector3(*spin)
-    O.subStepping = True
-    for _ in range(len(O.engines)):
-        O.step()
-    O.subStepping = False
+    contact_laws.to_forces(O)
     f = np.array([O.forces.f(b.id) for b in grains])
     t = np.array([O.forces.t(b.id) for b in grains])
     return f, t

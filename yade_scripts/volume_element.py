@@ -16,6 +16,7 @@ import compact_scene
 import contact_laws
 import contact_loop
 import continuation
+import forces_at_rest
 import mean_stress
 import packing
 import probing
@@ -25,12 +26,7 @@ import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {  # of what no case sets
-    "arguments": (),
-    "script_steps": 1_000_000,
-    "script_seconds": 600.0,
-    "compare": continuation.FEW_STEPS,  # DEM steps beside the scene's own continuation
-}
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
@@ -61,6 +57,7 @@ class _Grains:
     clumped: bool
     states: list  # YADE's objects with positions and rotations
     new_adhesion: tuple | None  # (f_c [N], friction) that contacts formed later get
+    in_order: bool  # sums run over the contacts as in compact cells
 
 
 class Engine:
@@ -88,12 +85,13 @@ class Engine:
         adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
         left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None
-        own, itself = self.O.dt, continuation.own(self.O, self._to_forces)
+        own, itself = self.O.dt, continuation.own(self.O)
         try:
             manifest.update(adoption.adopt(self.O))
             manifest["time_step_from"] = set_time_step(self.O, own, spec["time_step_safety"])
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             archive_check.refuse_not_finite(self.O, "after its adoption")
+            archive_check.refuse_other_forces(self.O)
         except Exception:
             itself.dismiss()
             raise
@@ -126,7 +124,7 @@ class Engine:
             adopted = archive_check.state(self.O)
             archive_check.refuse_not_finite(self.O, f"after {steps} steps of a small strain")
             before = self._at_rest() if viscosity.noted(self.O) > 0 else adopted
-            self.replace(ve, self.save(ve))
+            self.replace(ve, self.O.sceneToString())  # without its forces: what they are found to be tells what was dropped
             archive_check.refuse_dropped(before, archive_check.state(self.O), self.O, f"after {steps} steps of a small strain")
         except Exception:
             itself.dismiss()
@@ -146,7 +144,7 @@ class Engine:
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()
         self._utils.calm()
-        self._to_forces()
+        contact_laws.to_forces(self.O)
         O.dt = time_step
         return archive_check.state(O)
 
@@ -175,12 +173,14 @@ class Engine:
         O = self.O
         O.stringToScene(state)
         O.forces.reset(False)  # resetting permanent forces as well crashes YADE where bodies have been erased
+        kept = forces_at_rest.Kept(O)
         without = contact_laws.sliding_without_normal_force(O.interactions)
         time_step, O.dt = O.dt, contact_laws.resting_time_step(O)
         O.step()  # YADE stores no forces: finish the step in no time and find them again
         contact_laws.note_restored(O)
-        self._to_forces()
-        contact_laws.take_normal_force(O.forces, without)
+        contact_laws.to_forces(O)
+        if not kept.put_back(O):
+            contact_laws.take_normal_force(O.forces, without)
         O.dt = time_step
         if os.environ.get("FEMXDEM_SORTED_CONTACTS"):
             contact_laws.loop_in_order(O)
@@ -188,7 +188,7 @@ class Engine:
 
     def save(self, ve):
         self._select(ve)
-        return self.O.sceneToString()
+        return forces_at_rest.saved(self.O)
 
     def export_scene(self, state):
         ve = self.add(state)
@@ -229,7 +229,7 @@ class Engine:
                 self._run_sampled(steps, sample_every, late, out_mean, self._grains[ve].new_adhesion)
             else:
                 contact_laws.run(self.O, steps, self._grains[ve].new_adhesion)
-                self._to_forces()
+                contact_laws.to_forces(self.O)
         except RuntimeError as error:
             if "larger than half of the cell" not in str(error):
                 raise
@@ -248,7 +248,7 @@ class Engine:
         mean.add(0, self._symmetric_stress())
         for step in mean_stress.sampled_steps(steps, every):
             contact_laws.run(self.O, step - made, new_adhesion)
-            self._to_forces()
+            contact_laws.to_forces(self.O)
             mean.add(step, self._symmetric_stress())
             made = step
         out_mean[:] = mean.mean()
@@ -303,7 +303,7 @@ class Engine:
             formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
             C = formula(c, kn, kt, volume)
         elif not relaxed:
-            C = probing.stiffness(self.O, self._love_weber, self._to_forces)
+            C = probing.stiffness(self.O, self._love_weber)
         else:
             raise RuntimeError(
                 "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
@@ -312,29 +312,27 @@ class Engine:
 
     def follow_network(self, ve):
         self._select(ve)
-        follow_network(self.O)
+        if not self._sums_in_order():
+            follow_network(self.O)
+            return
+        cell = compact_scene.cell(self.O)
+        cell.follow_network()
+        self.O.dt = cell.info()["time_step"] * self._grains[ve].unit.in_a_second
 
     def _select(self, ve):
         if self.O.thisScene != ve:
             self.O.switchToScene(ve)
 
     def _sums_in_order(self):
-        """Whether answers are to have the bits of compact cells."""
-        return os.environ.get("FEMXDEM_SORTED_CONTACTS") and not compact_scene.covered(self.O)
+        """Whether the answers of the current scene are to have the bits of compact cells."""
+        grains = self._grains.get(self.O.thisScene)
+        return grains is not None and grains.in_order
 
     def _love_weber(self):
         """Stress (3, 3) [Pa], tension positive, slightly asymmetric."""
         if self._sums_in_order():
-            return np.array(compact_scene.cell(self.O).stress()).reshape(3, 3)
+            return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
-
-    def _to_forces(self):
-        """From a step's beginning to the contact forces of that step: cell, contacts, not the integrator (the last)."""
-        O = self.O
-        O.subStepping = True
-        for _ in range(len(O.engines)):
-            O.step()
-        O.subStepping = False
 
     def _geometry(self, grains):
         """The numbers of protocol.py's info()."""
@@ -385,7 +383,8 @@ def _grains(O):
     states = [b.state for b in O.bodies]
     new_adhesion = contact_laws.adhesion_of_new_contacts(O)
     diameter = 2 * float(radius[radius > 0].mean())
-    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion)
+    in_order = bool(os.environ.get("FEMXDEM_SORTED_CONTACTS")) and not compact_scene.covered(O)
+    return _Grains(len(grains), radius, solid, diameter, density, unit, clumped, states, new_adhesion, in_order)
 
 
 def _mean_rotation(states):

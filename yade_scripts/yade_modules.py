@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 DEFAULT_DIR = "/usr/lib/x86_64-linux-gnu/yade-double/py"
-PYTHON_VERSION = (3, 11)  # the interpreter Debian 12 builds YADE for
+PYTHON_VERSION = (3, 11)  # the interpreter Debian 12 builds that YADE for
 
 
 def load():
@@ -16,12 +16,12 @@ def load():
     and deterministic. MPI's variables are removed, or YADE would start an MPI of its own.
     Raises RuntimeError on another interpreter or a missing folder.
     """
-    if sys.version_info[:2] != PYTHON_VERSION:
+    folder = Path(os.environ.get("FEMXDEM_YADE_DIR") or DEFAULT_DIR)
+    if str(folder) == DEFAULT_DIR and sys.version_info[:2] != PYTHON_VERSION:
         raise RuntimeError(
-            f"YADE is built for Python {PYTHON_VERSION[0]}.{PYTHON_VERSION[1]}, but this is {sys.executable} "
+            f"Debian's YADE is built for Python {PYTHON_VERSION[0]}.{PYTHON_VERSION[1]}, but this is {sys.executable} "
             f"{sys.version.split()[0]}: use /usr/bin/python3 (CMake: -DFEMXDEM_PYTHON=/usr/bin/python3)."
         )
-    folder = Path(os.environ.get("FEMXDEM_YADE_DIR") or DEFAULT_DIR)
     if not (folder / "yade" / "__init__.py").is_file():
         raise RuntimeError(
             f"No YADE in {folder}: install Debian's package python3-yade, or set FEMXDEM_YADE_DIR to the folder that "

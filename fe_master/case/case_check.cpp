@@ -176,6 +176,30 @@ void check_material(const Case& c, Mistakes& m) {
   }
 }
 
+/// The paper's law is one of compact cells, and of packings that are prepared for it.
+void check_paper_law(const VeParameters& ve, const std::string& key, Mistakes& m) {
+  if (ve.engine == EngineChoice::yade)
+    m.add(key + ".contact_law",
+          "ve.contact_law = \"paper\" is a law of compact cells, which YADE has not; set ve.engine = \"auto\" or "
+          "\"compact\", or contact_law = \"adhesive\"");
+  if (ve.source != VeSource::prepare)
+    m.add(
+        key + ".contact_law",
+        "ve.contact_law = \"paper\" needs ve.source = \"prepare\"; a script or a scene brings its own law, remove it");
+  if (ve.hold_steps > 0 && ve.answer == VeAnswer::mean)
+    m.add(key + ".hold_steps",
+          "ve.hold_steps > 0 has no mean that belongs to mid-step; set ve.answer = \"end\", or hold_steps = 0");
+}
+
+void check_other_law(const VeParameters& ve, const std::string& key, Mistakes& m) {
+  for (const auto& [name, used] : {std::pair{"viscous_damping", ve.viscous_damping > 0.0},
+                                   {"start_at_rest", ve.start_at_rest},
+                                   {"hold_steps", ve.hold_steps > 0}})
+    if (used)
+      m.add(fmt::format("{}.{}", key, name),
+            fmt::format("ve.{} is a switch of contact_law = \"paper\" alone; set that law, or remove {}", name, name));
+}
+
 void check_one_ve(const VeParameters& ve, const std::string& key, Mistakes& m) {
   if (ve.source == VeSource::scene && ve.scene.empty() && !m.has(key + ".scene"))
     m.add(key + ".source", "ve.source = \"scene\" needs a file; give ve.scene");
@@ -188,9 +212,16 @@ void check_one_ve(const VeParameters& ve, const std::string& key, Mistakes& m) {
   if (ve.contact_law == ContactLaw::friction && ve.cohesion > 0.0)
     m.add(key + ".cohesion",
           "ve.cohesion > 0 needs contact_law = \"adhesive\" or \"bonded\"; set one, or cohesion = 0");
-  if (ve.new_contacts == NewContacts::adhesive && (ve.contact_law != ContactLaw::adhesive || !(ve.cohesion > 0.0)))
+  const bool paper = ve.contact_law == ContactLaw::paper;
+  const bool adhesion = (paper || ve.contact_law == ContactLaw::adhesive) && ve.cohesion > 0.0;
+  if (ve.new_contacts == NewContacts::adhesive && !adhesion)
     m.add(key + ".new_contacts",
-          "ve.new_contacts = \"adhesive\" needs contact_law = \"adhesive\" and cohesion > 0; set both or remove it");
+          "ve.new_contacts = \"adhesive\" needs contact_law = \"adhesive\" or \"paper\", and cohesion > 0; set both or "
+          "remove it");
+  if (paper)
+    check_paper_law(ve, key, m);
+  else
+    check_other_law(ve, key, m);
 }
 
 void check_ve(const Case& c, Mistakes& m) {
@@ -267,6 +298,12 @@ void check_solver(const Case& c, Mistakes& m) {
           fmt::format("solver.tolerance = {:g} is below {:.1e}, which the noise {:g} of the volume element's stress "
                       "allows; raise it, or lower ve.inertial_number or take more spheres and measure again",
                       c.solver.tolerance, floor, c.solver.noise));
+  if (c.solver.reuse_below > 0 && c.solver.global_operator != GlobalOperator::quasi_newton)
+    m.add("solver.reuse_below",
+          "solver.reuse_below needs learned tangents; set solver.operator = \"quasi_newton\", or reuse_below = 0");
+  if (c.solver.reuse_below > 0 && volume_elements(c) && c.ve.answer == VeAnswer::mean)
+    m.add("solver.reuse_below",
+          "solver.reuse_below is for answers of a trial's end; set ve.answer = \"end\", or reuse_below = 0");
   if (c.solver.qn_min >= c.solver.qn_max) m.add("solver.qn_min", "solver.qn_min is not below qn_max; lower it");
 }
 
@@ -285,6 +322,7 @@ void check_monitor(const Monitor& monitor, const std::string& key, const std::se
 void check_monitors(const Case& c, const std::optional<std::set<std::string>>& edges,
                     const std::set<std::string>& regions, Mistakes& m) {
   std::set<std::string> names = {"step", "time", "load_factor", "iterations", "evaluations", "dem_steps", "residual"};
+  if (c.solver.reuse_below > 0) names.insert({"reused", "reuse_error"});
   for (std::size_t i = 0; i < c.monitors.size(); ++i) {
     const std::string key = fmt::format("monitor.{}", i);
     const std::string& name = c.monitors[i].name;

@@ -155,8 +155,11 @@ Section<VeParameters> ve_section() {
        parameter("stiffness_ratio", &V::stiffness_ratio, "", kPositive, "k_n / k_t"),
        parameter("friction", &V::friction, "", {0.0, 10.0}, "mu, inter-granular"),
        parameter("cohesion", &V::cohesion, "", kNotNegative, "p* = f_c / (sigma_0 a^2)"),
-       word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction"},
-            "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none"),
+       word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction", "paper"},
+            "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none; paper: f_n = "
+            "k_n delta - f_c, |f_t| <= mu k_n delta, in compact cells alone: README of validation/contact_laws"),
+       parameter("viscous_damping", &V::viscous_damping, "", {0.0, 2.0},
+                 "paper: dashpot of a contact's normal / the critical one"),
        word("new_contacts", &V::new_contacts, {"frictional", "adhesive"},
             "contacts that form after the preparation: without adhesion, or adhesive as the others"),
        parameter("compaction_friction", &V::compaction_friction, "", {0.0, 10.0},
@@ -173,6 +176,9 @@ Section<VeParameters> ve_section() {
                  "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
        parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
        parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
+       parameter("start_at_rest", &V::start_at_rest, "", kAny, "paper: a trial begins without velocities"),
+       parameter("hold_steps", &V::hold_steps, "", kNotNegative,
+                 "paper: DEM steps without strain at the end of a trial that strains"),
        parameter("freeze_steps", &V::freeze_steps, "", kAny,
                  "the DEM steps of a load step's trials are those of its first; false: for comparison only"),
        parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
@@ -272,8 +278,15 @@ Section<SolverParameters> solver_section() {
        parameter("qn_skew", &S::qn_skew, "", kNotNegative, "learned tangent: norm of the skew part, elastic metric"),
        parameter(
            "qn_first", &S::qn_first, "", {0.0, 1.0},
-           "weight of what a step's first trial teaches against its start; default 0 for volume elements, else 1"),
+           "weight of what a step's first trial teaches against its start; default 0.5 for volume elements, else 1"),
+       parameter(
+           "qn_scatter", &S::qn_scatter, "", {0.0, 1.0},
+           "of a pair's stress about what its strain explains, over it; 0: every pair is met exactly; default 0.1 "
+           "for volume elements, else 0"),
        parameter("qn_noise", &S::qn_noise, "", kNotNegative, "strain change below which nothing is learned"),
+       parameter("reuse_below", &S::reuse_below, "", {0.0, 1.0},
+                 "a point that has moved by less of the step's strain since its last trial answers from its learned "
+                 "tangent; 0: none"),
        parameter("start_amplitude", &S::start_amplitude, "", kNotNegative,
                  "random start of one step / its displacement: finds other solutions"),
        parameter("start_time", &S::start_time, "s", kNotNegative, "the random start is that of the step past this"),
@@ -366,10 +379,11 @@ const CaseSections& case_sections() {
                    .monitor = monitor_section(),
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
-    s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                            {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot",
-                             "inertial_number", "answer", "mean_at", "min_steps", "freeze_steps",
-                             "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
+    s.ve_region =
+        region_of(s.ve, &RegionVe::region, &RegionVe::ve,
+                  {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot",
+                   "inertial_number", "answer", "mean_at", "min_steps", "start_at_rest", "hold_steps", "freeze_steps",
+                   "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
     return s;
   }();
   return sections;

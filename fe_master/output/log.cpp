@@ -11,7 +11,8 @@ namespace {
 
 /// Whether a line of progress can be written over. Under mpirun, standard output is a terminal of mpirun's own, whose
 /// text goes who knows where; a scheduler's job writes to a file.
-bool shows_updates(std::FILE* terminal) {
+bool shows_updates(std::FILE* terminal, std::optional<bool> asked) {
+  if (asked) return *asked;
   for (const char* batch : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_JOB_ID", "PBS_JOBID", "LSB_JOBID", "JOB_ID"})
     if (std::getenv(batch) != nullptr) return false;
   const char* kind = std::getenv("TERM");
@@ -27,8 +28,8 @@ std::string readable_duration(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
-Log::Log(const std::filesystem::path& file, Existing existing, std::FILE* terminal)
-    : stream_(file, existing == Existing::resume), terminal_(terminal), updates_(shows_updates(terminal)) {}
+Log::Log(const std::filesystem::path& file, Existing existing, std::FILE* terminal, std::optional<bool> progress)
+    : stream_(file, existing == Existing::resume), terminal_(terminal), updates_(shows_updates(terminal, progress)) {}
 
 Log::~Log() { end_progress_line(); }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -28,8 +29,10 @@ struct IterationRecord {
 /// written.
 class Log {
  public:
-  /// With Existing::resume the text of the earlier run is kept.
-  Log(const std::filesystem::path& file, Existing existing, std::FILE* terminal = stdout);
+  /// With Existing::resume the text of the earlier run is kept. `progress`: whether the line updates; if not given,
+  /// where `terminal` is one that nobody else writes for, neither mpirun nor a scheduler.
+  Log(const std::filesystem::path& file, Existing existing, std::FILE* terminal = stdout,
+      std::optional<bool> progress = {});
   ~Log();
   Log(const Log&) = delete;
   Log& operator=(const Log&) = delete;

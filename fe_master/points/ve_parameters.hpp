@@ -8,7 +8,7 @@ namespace femxdem {
 /// Settings of speed against accuracy: validation/speed_accuracy has their errors.
 enum class VePreset { none, fast, balanced, accurate };
 enum class VeSource { prepare, scene, script };
-enum class ContactLaw { adhesive, bonded, friction };
+enum class ContactLaw { adhesive, bonded, friction, paper };
 enum class NewContacts { frictional, adhesive };
 enum class Snapshot { fork, serialise };
 enum class VeStiffness { affine, relaxed };
@@ -30,6 +30,7 @@ struct VeParameters {
   double friction = 0.5;                          ///< mu, inter-granular [-]
   double cohesion = 1.0;                          ///< p* = f_c / (sigma_0 a^2) [-]
   ContactLaw contact_law = ContactLaw::adhesive;  ///< what cohesion means
+  double viscous_damping = 0.0;                   ///< of a contact's normal, paper's law / critical [-]
   double compaction_friction = 0.0;               ///< mu during the preparation: sets the density [-]
   double confining_stress = 1e5;                  ///< sigma_0, isotropic [Pa], compression positive
   double mean_diameter = 1e-3;                    ///< a [m]
@@ -43,6 +44,8 @@ struct VeParameters {
   int min_steps = 10;                             ///< least DEM steps of a trial that strains
   bool freeze_steps = true;                       ///< the DEM steps of a load step's trials are those of its first
   double max_unbalanced_force = 0.2;              ///< an answer above is refused [-]
+  bool start_at_rest = false;                     ///< a trial forgets the velocities of its start
+  int hold_steps = 0;                             ///< DEM steps at the end of a trial, without deformation
   NewContacts new_contacts = NewContacts::frictional;
   VeStiffness stiffness = VeStiffness::affine;
   Snapshot snapshot = Snapshot::fork;

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Thickness and inclination of a shear band, from results.h5.
 
-    fe_master/program/band.py DIR [--from STEP] [--to STEP]
+    femxdem band DIR [--from STEP] [--to STEP]
 
 Thickness: full width at half height of the second invariant of the logarithmic strain along the normal of the band,
 averaged along the band. Inclination: angle between the band and the lateral axis x, in degrees. Both in the current
@@ -10,14 +10,13 @@ interpolated linearly, so any mesh will do.
 """
 
 import argparse
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
-from results import ResultsError, deformed_points, read_mesh, read_step, strain_invariant_between
+from results import ResultsError, deformed_points, end_with, read_mesh, read_step, strain_invariant_between
 
 
 @dataclass
@@ -184,7 +183,7 @@ def band_of_run(folder, first=None, last=None):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="femxdem band", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", help="folder that `femxdem run` wrote")
     parser.add_argument("--from", dest="first", type=int, metavar="STEP", help="output step where the strain starts")
     parser.add_argument("--to", dest="last", type=int, metavar="STEP", help="output step where it ends (default: the last)")
@@ -192,7 +191,7 @@ def main():
     try:
         band = band_of_run(arguments.folder, arguments.first, arguments.last)
     except ResultsError as error:
-        sys.exit(f"band.py: {error}")
+        end_with("band", error)
     print(f"thickness {band.thickness:.4g} m (scatter {band.thickness_scatter:.2g} over {band.stations} profiles), "
           f"inclination {band.inclination:.1f} degrees from the lateral axis, peak {band.peak:.3g}")
 

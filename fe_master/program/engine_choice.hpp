@@ -20,7 +20,8 @@ struct EngineVerdict {
 
 /// What ve.engine asks for. Compact cells are taken where they cover every template and where each template, strained
 /// in both engines for 20 steps, ends in the same state to the bit; else "auto" is YADE and the sentence says why, and
-/// "compact" is a UserError. states: of the templates, as make_templates gives them.
+/// "compact" is a UserError. The paper's law is one that YADE has not: such a template is compact without a comparison,
+/// and a UserError where another one has to be YADE's. states: of the templates, as make_templates gives them.
 EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std::vector<std::string>& states);
 
 /// The worker of a rank for these volume elements.

@@ -18,6 +18,7 @@
 #include "mesh.hpp"
 #include "output_folder.hpp"
 #include "time_loop.hpp"
+#include "tools.hpp"
 #include "ve_commands.hpp"
 #include "ve_templates.hpp"
 #include "versions.hpp"
@@ -35,6 +36,7 @@ struct Arguments {
   std::vector<std::string> overrides;
   bool restart = false;
   bool overwrite = false;
+  std::optional<bool> progress;
   int noise_samples = 0;
   int compare = 0;
   bool markdown = false;
@@ -88,6 +90,7 @@ RunOptions run_options(const Arguments& arguments) {
                      : arguments.overwrite ? Existing::overwrite
                                            : Existing::refuse;
   options.command_line = arguments.command_line;
+  options.progress = arguments.progress;
   options.versions = library_versions();
   return options;
 }
@@ -200,22 +203,31 @@ int main(int argc, char** argv) {
     command->add_option("case", arguments.case_file, "Case file (TOML)")->required();
     command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
   };
+  const auto add_progress = [&](CLI::App* command) {
+    command->add_flag_callback(
+        "--progress", [&] { arguments.progress = true; },
+        "One line that updates (default on terminals, but not under mpirun or a scheduler)");
+    command->add_flag_callback(
+        "--no-progress", [&] { arguments.progress = false; }, "A line for each step");
+  };
   CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
   add_case(run_command);
   run_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
   run_command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
   run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(run_command);
   CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
   add_case(check_command);
   CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
   parameters_command->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
 
-  CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect");
+  CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect, serve");
   ve_command->require_subcommand(1);
   CLI::App* path_command = ve_command->add_subcommand("path", "Follow the [[path]] of a case with one material point");
   add_case(path_command);
   path_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
   path_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(path_command);
   path_command
       ->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
       ->check(CLI::Range(3, 1000));
@@ -232,13 +244,19 @@ int main(int argc, char** argv) {
       ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");
   add_case(inspect_command);
   inspect_command->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
+  CLI::App* serve_command = ve_command->add_subcommand(
+      "serve", "Answer one strain a line of the standard input, for scripts: femxdem.py (the module femxdem)");
+  add_case(serve_command);
+  for (const Tool& tool : tools()) app.add_subcommand(std::string(tool.name), std::string(tool.help));
 
   try {
+    if (const Tool* tool = argc > 1 ? find_tool(argv[1]) : nullptr) become(*tool, {argv + 2, argv + argc});
     app.parse(argc, argv);
     if (*run_command) return run(arguments);
     if (*check_command) return check(arguments);
     if (*path_command) return ve_path(ve_arguments(arguments));
     if (*prepare_command) return ve_prepare(ve_arguments(arguments));
+    if (*serve_command) return ve_serve(ve_arguments(arguments));
     if (*inspect_command) return ve_inspect(ve_arguments(arguments));
     if (*parameters_command) std::cout << (arguments.markdown ? parameters_markdown() : describe_parameters());
     if (app.get_subcommands().empty()) std::cout << app.help();

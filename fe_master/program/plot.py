@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Figures of a run: curve, maps on the deformed mesh, cost of the steps.
 
-    fe_master/program/plot.py DIR [--ve DIR2] [--out FOLDER] [--steps N ...]
+    femxdem plot DIR [--ve DIR2] [--out FOLDER] [--steps N ...]
 
 The curve is that of the monitors: axial stress over sigma_0 against nominal axial strain (reaction_y and displacement_y of an
 edge), compression positive; else the pressure on an edge over sigma_0 against that edge's displacement (pressure,
@@ -11,7 +11,6 @@ volumetric strain, the porosity and the seconds that the DEM took, at the last o
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 import matplotlib
@@ -22,7 +21,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.ticker import MaxNLocator
 
-from results import (ResultsError, natural_coordinates, path_curve, read_history, read_mesh, read_step, run_curve,
+from results import (ResultsError, end_with, natural_coordinates, path_curve, read_history, read_mesh, read_step, run_curve,
                      shape_functions)
 
 LABELS = {
@@ -137,7 +136,7 @@ def plot_run(folder, out, ve_folder=None, steps=(None,), window=None):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="femxdem plot", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", type=Path, help="folder that `femxdem run` wrote")
     parser.add_argument("--ve", metavar="DIR2", type=Path, help="folder of `femxdem ve path`, drawn over the curve")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="where the figures go (default: DIR)")
@@ -147,7 +146,7 @@ def main():
     try:
         files = plot_run(arguments.folder, arguments.out or arguments.folder, arguments.ve, arguments.steps, arguments.window)
     except ResultsError as error:
-        sys.exit(f"plot.py: {error}")
+        end_with("plot", error)
     for file in files:
         print(file)
 

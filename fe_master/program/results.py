@@ -4,6 +4,7 @@ Stresses are Cauchy, tension positive, as in the files; curves are compression p
 """
 
 import csv
+import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,21 @@ class ResultsError(Exception):
     """What is missing in a folder, where, and what to do: one sentence."""
 
 
+def _there(file):
+    if not Path(file).exists():
+        raise ResultsError(f"{file}: not there; give the folder that `femxdem run` wrote")
+    return Path(file)
+
+
+def end_with(tool, error):
+    """Ends a subcommand of the program on bad input."""
+    print(f"femxdem {tool}: {error}", file=sys.stderr)
+    sys.exit(2)
+
+
 def read_columns(file):
     """Columns of a CSV file of numbers by name."""
-    file = Path(file)
-    if not file.exists():
-        raise ResultsError(f"{file}: not there; give the folder that `femxdem run` wrote")
-    with open(file, newline="") as stream:
+    with open(_there(file), newline="") as stream:
         rows = list(csv.reader(stream))
     if len(rows) < 2:
         raise ResultsError(f"{file}: no converged step in it; see log.txt beside it")
@@ -35,10 +45,7 @@ def read_history(folder):
 
 def read_case(folder):
     """The effective case as a dictionary."""
-    file = Path(folder) / "case.toml"
-    if not file.exists():
-        raise ResultsError(f"{file}: not there; give the folder that `femxdem run` wrote")
-    return tomllib.loads(file.read_text())
+    return tomllib.loads(_there(Path(folder) / "case.toml").read_text())
 
 
 @dataclass
@@ -58,10 +65,7 @@ class Step:
 
 
 def open_results(folder):
-    file = Path(folder) / "results.h5"
-    if not file.exists():
-        raise ResultsError(f"{file}: not there; give the folder that `femxdem run` wrote")
-    return h5py.File(file, "r", locking=False)
+    return h5py.File(_there(Path(folder) / "results.h5"), "r", locking=False)
 
 
 def read_mesh(folder):
@@ -158,8 +162,7 @@ class Curve:
     against: str = "axial strain [%] (nominal, compression positive)"  #: what 100 times `strain` is, as on an axis
 
 
-def _curve(strain, stress, case, label, **names):
-    sigma_0 = confining_stress(case)
+def _curve(strain, stress, sigma_0, label, **names):
     return Curve(strain, stress / sigma_0, label, **names) if sigma_0 else Curve(strain, stress, label, "[Pa]", **names)
 
 
@@ -186,7 +189,7 @@ def axial_curve(folder, edge="top", label=None, nominal=False):
     shortening = -history[_monitor(case, "displacement_y", edge, folder)]
     if not nominal and any(m["quantity"] == "length" and m.get("edge") == edge for m in case["monitor"]):
         width = history[_monitor(case, "length", edge, folder)]
-    return _curve(shortening / height, -reaction / width, case, label or str(folder))
+    return _curve(shortening / height, -reaction / width, confining_stress(case), label or str(folder))
 
 
 def pressure_curve(folder, edge="inner", label=None):
@@ -197,10 +200,8 @@ def pressure_curve(folder, edge="inner", label=None):
     moved = np.hypot(*(history[_monitor(case, f"displacement_{axis}", edge, folder)] for axis in "xy"))
     kept = [load["value"] for load in case["load"] if load["kind"] == "pressure" and not load.get("table")]
     sigma_0 = kept[0] if kept and kept[0] else case.get("ve", {}).get("confining_stress", 0)
-    names = {"of": f"pressure on {edge}", "against": f"mean displacement of {edge} [cm]"}
-    if sigma_0:
-        return Curve(moved, pressure / sigma_0, label or str(folder), **names)
-    return Curve(moved, pressure, label or str(folder), "[Pa]", **names)
+    against = f"mean displacement of {edge} [cm]"
+    return _curve(moved, pressure, sigma_0, label or str(folder), of=f"pressure on {edge}", against=against)
 
 
 def run_curve(folder, label=None):
@@ -226,4 +227,4 @@ def path_curve(folder, component="yy", label="single volume element", nominal=Fa
         raise ResultsError(f"{folder}/history.csv: no column {missing[0]}; give the folder of `femxdem ve path`")
     strain = 1 - np.exp(history[f"strain_{component}"])
     width = np.exp(history["strain_xx"]) if nominal else 1.0
-    return _curve(strain, -history[f"stress_{component}"] * width, case, label)
+    return _curve(strain, -history[f"stress_{component}"] * width, confining_stress(case), label)

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Shear bands that start at the wall of a hollow cylinder: how many, how far they reach, how thick they are.
 
-    fe_master/program/spirals.py DIR [--from STEP] [--to STEP] [--angle 90]
+    femxdem spirals DIR [--from STEP] [--to STEP] [--angle 90]
 
 Bands of a cylinder under pressure are logarithmic spirals: they cut every radius at the same angle, so that in the plane of
 ln r and polar angle, a conformal map of the body, they are straight lines. On circles the ridges of the second invariant of
@@ -11,14 +11,13 @@ beside it (a pressure strains the whole wall), averaged along it, all in the cur
 """
 
 import argparse
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import find_peaks
 
 from band import axes_of, interpolator
-from results import ResultsError, deformed_points, read_mesh, read_step, strain_invariant_between
+from results import ResultsError, deformed_points, end_with, read_mesh, read_step, strain_invariant_between
 
 
 @dataclass
@@ -165,7 +164,7 @@ def spirals_of_run(folder, first=None, last=None, angle=90.0):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="femxdem spirals", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", help="folder that `femxdem run` wrote")
     parser.add_argument("--from", dest="first", type=int, metavar="STEP", help="output step where the strain starts")
     parser.add_argument("--to", dest="last", type=int, metavar="STEP", help="output step where it ends (default: the last)")
@@ -174,7 +173,7 @@ def main():
     try:
         spirals = spirals_of_run(arguments.folder, arguments.first, arguments.last, arguments.angle)
     except ResultsError as error:
-        sys.exit(f"spirals.py: {error}")
+        end_with("spirals", error)
     for one in spirals:
         print(f"from {one.start:.0f} degrees, {one.inclination:+.1f} degrees to the radius, reaches {one.reach:.2f} wall radii, "
               f"thickness {one.thickness:.3g} m (scatter {one.thickness_scatter:.2g} over {one.stations} profiles), peak {one.peak:.3g}")

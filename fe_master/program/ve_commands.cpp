@@ -1,23 +1,26 @@
 #include "ve_commands.hpp"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <iostream>
 
 #include "engine_choice.hpp"
 #include "errors.hpp"
+#include "locations.hpp"
 #include "mesh.hpp"
 #include "output_folder.hpp"
 #include "path.hpp"
+#include "tools.hpp"
+#include "ve_service.hpp"
 #include "ve_templates.hpp"
 
 namespace femxdem {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kServedTrials = 100;  // for how many of them YADE repeats
 
 void say(std::string_view line) { std::cout << line << std::endl; }
 
@@ -54,10 +57,12 @@ double expected_trials(const Case& c) {
   return 3 * increments;
 }
 
-int path_of_volume_element(const Case& c, VeArguments& arguments) {
+/// Makes the volume element of a case and calls `use` with it; what its making says and decides goes into
+/// arguments.options.
+template <class Use>
+int with_volume_element(const Case& c, VeArguments& arguments, double trials, Use use) {
   WorkerProcess worker(worker_command(c.ve));
   PythonVolumeElements maker(worker, ve_options(c.ve));
-  arguments.options.lock = prepare_output_folder(arguments.options.folder, arguments.options.existing);
   VeParameters ve = single_ve(c);
   ve.cache = writable_cache(ve, arguments.options.folder);
   const std::string state = make_templates(maker, {ve}, [&](std::string_view line) {
@@ -67,7 +72,7 @@ int path_of_volume_element(const Case& c, VeArguments& arguments) {
   arguments.options.versions.merge(engine_versions(maker));
   const EngineVerdict verdict = choose_engine(c.ve.engine, worker, {state});
   arguments.options.remarks.push_back(verdict.sentence);
-  const auto point = make_local_points(verdict.engine, worker, c.ve, expected_trials(c), arguments.options.folder, 1);
+  const auto point = make_local_points(verdict.engine, worker, c.ve, trials, arguments.options.folder, 1);
   arguments.options.complete = [&](Summary& summary) {
     summary.peak_memory_workers = point->peak_memory();
     summary.threads = point->threads();
@@ -75,7 +80,14 @@ int path_of_volume_element(const Case& c, VeArguments& arguments) {
     summary.engine_check = describe(point->engine_check());
   };
   point->add(state, 1);
-  return follow_path(c, *point, arguments.options, arguments.noise_samples);
+  return use(*point);
+}
+
+int path_of_volume_element(const Case& c, VeArguments& arguments) {
+  arguments.options.lock = prepare_output_folder(arguments.options.folder, arguments.options.existing);
+  return with_volume_element(c, arguments, expected_trials(c), [&](LocalPoints& point) {
+    return follow_path(c, point, arguments.options, arguments.noise_samples);
+  });
 }
 
 /// All volume elements of a case: those of its mesh, or of its seeds where it has none.
@@ -93,25 +105,6 @@ std::vector<VeParameters> pool_of(const VeArguments& arguments) {
     pool.back().seed = seed;
   }
   return pool;
-}
-
-/// Runs a Python program with this one's modules and waits for it; its exit status.
-int run_program(std::vector<std::string> words) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  std::cout.flush();
-  const pid_t pid = fork();
-  if (pid == 0) {
-    setenv("PYTHONPATH", FEMXDEM_PYTHON_MODULES, 1);
-    setenv("OMP_NUM_THREADS", "1", 1);
-    setenv("HOME", "/tmp", 0);  // Matplotlib looks for it
-    execv(arguments[0], arguments.data());
-    _exit(127);
-  }
-  int status = 0;
-  waitpid(pid, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kPointFailed;
 }
 
 }  // namespace
@@ -137,6 +130,17 @@ int ve_prepare(const VeArguments& arguments) {
   return kDone;
 }
 
+int ve_serve(VeArguments arguments) {
+  refuse_ranks();
+  const Case c = read_path_case(arguments.file, arguments.overrides);
+  refuse_closed_form(c);
+  arguments.options.folder = fs::temp_directory_path();  // for packings where nothing else can be written
+  return with_volume_element(c, arguments, kServedTrials, [&](LocalPoints& point) {
+    serve_volume_element(point, std::cin, std::cout);
+    return kDone;
+  });
+}
+
 int ve_inspect(const VeArguments& arguments) {
   refuse_ranks();
   fs::path state = arguments.file, folder = arguments.options.folder;
@@ -158,8 +162,7 @@ int ve_inspect(const VeArguments& arguments) {
                     "give the case that names it",
                     state.string()));
   if (folder.empty()) folder = "out" / state.stem();
-  const fs::path script = fs::path(FEMXDEM_YADE_SCRIPTS) / "inspect_ve.py";
-  return run_program({FEMXDEM_PYTHON, script.string(), state.string(), "--out", folder.string()});
+  become_python(locations().yade_scripts / "inspect_ve.py", {state.string(), "--out", folder.string()});
 }
 
 }  // namespace femxdem

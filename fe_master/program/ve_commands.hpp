@@ -22,6 +22,9 @@ int ve_path(VeArguments arguments);
 /// Makes the case's volume elements where the cache does not have them and prints their manifests.
 int ve_prepare(const VeArguments& arguments);
 
+/// Answers strains of the case's first volume element, see serve_volume_element.
+int ve_serve(VeArguments arguments);
+
 /// Draws packing, force chains and fabric rose of the case's first volume element, or of a prepared state, as PNG.
 int ve_inspect(const VeArguments& arguments);
 

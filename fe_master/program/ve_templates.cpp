@@ -14,6 +14,7 @@
 
 #include "errors.hpp"
 #include "hash.hpp"
+#include "locations.hpp"
 #include "manifest.hpp"
 #include "output_folder.hpp"
 
@@ -29,7 +30,7 @@ std::string key_of(const VeParameters& ve, const std::string& specification, con
   for (const std::string& file : {ve.script, ve.scene}) {
     if (!file.empty()) key += read_file(file);
   }
-  return hash_text(key + makers(FEMXDEM_YADE_SCRIPTS));
+  return hash_text(key + makers(locations().yade_scripts));
 }
 
 std::map<std::string, std::string> parse_strings(const std::string& json) {
@@ -160,6 +161,8 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   options.inertial_number = ve.inertial_number;
   options.min_steps = ve.min_steps;
   options.answer_at = answer_at(ve);
+  options.start_at_rest = ve.start_at_rest;
+  options.hold_steps = ve.hold_steps;
   options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
   options.relaxed = ve.stiffness == VeStiffness::relaxed;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "locations.hpp"
 #include "ve_templates.hpp"
 
 namespace femxdem {
@@ -37,7 +38,7 @@ std::string describe_versions() {
   }
   std::string text;
   for (const auto& [name, version] : versions) text += fmt::format("{:12} {}\n", name, version);
-  return text + missing;
+  return text + fmt::format("{:12} {}\n", "scripts", locations().yade_scripts.string()) + missing;
 }
 
 }  // namespace femxdem

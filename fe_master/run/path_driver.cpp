@@ -75,7 +75,7 @@ void PathDriver::begin_segment(const PathSegment& segment) {
   R_ = polar_decomposition(F_).R;
   tangent_.emplace(
       rotate(response_.stiffness, R_.transpose()), kAllComponents,
-      LearningLimits{parameters_.qn_min, parameters_.qn_max, parameters_.qn_skew, 1, parameters_.qn_noise});
+      LearningLimits{parameters_.qn_min, parameters_.qn_max, parameters_.qn_skew, 1, 0, parameters_.qn_noise});
   segment_ = segment;
   F_start_ = F_;
   E_start_ = path_strain(F_);

@@ -6,7 +6,7 @@ namespace femxdem {
 
 RunFiles::RunFiles(const Case& c, const RunOptions& options)
     : lock_(options.lock ? options.lock : prepare_output_folder(options.folder, options.existing)),
-      log(options.folder / "log.txt", options.existing),
+      log(options.folder / "log.txt", options.existing, stdout, options.progress),
       options_(options) {
   replace_file(options.folder / "case.toml", effective_toml(c));
   summary.ranks = options.ranks;

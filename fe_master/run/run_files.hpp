@@ -27,6 +27,7 @@ struct RunOptions {
   std::map<std::string, std::string> versions;
   std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
   std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
+  std::optional<bool> progress;      ///< see Log
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 

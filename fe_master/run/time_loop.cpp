@@ -28,6 +28,9 @@ class TimeLoop {
   void write_fields();
   void write_state();
   std::string place(std::size_t point) const;
+  bool reuses() const { return case_.solver.reuse_below > 0; }
+  std::vector<std::string> columns() const;
+  std::string reuse_account() const;
 
   Problem& problem_;
   const Case& case_;
@@ -42,6 +45,10 @@ class TimeLoop {
   StepSize size_;
   StepRecord record_;  // of the step under way, rejected attempts included
   StepResult last_;
+  struct Reuse {  // ReusedAnswers
+    long answers = 0;
+    double error = 0;  // largest that was accepted
+  } reuse_, reuse_of_step_;
   int last_checkpoint_ = 0;  // step of the one on the disk, 0: none
   double whole_time_ = 0;    // of the last step of which every file has what it should
 };
@@ -59,7 +66,7 @@ TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& o
       size_(
           {case_.control.step, case_.control.min_step, case_.control.max_step, case_.control.growth, case_.control.cut},
           case_.control.end_time) {
-  files_.begin_history(monitor_names(case_), resumed_.step);
+  files_.begin_history(columns(), resumed_.step);
 }
 
 int TimeLoop::go() {
@@ -77,10 +84,10 @@ int TimeLoop::go() {
     if (options_.existing != Existing::resume) write_fields();
     const int status = advance();
     const double time = solver_.time();
-    const std::string message = status == kDone
-                                    ? fmt::format("{} steps to time {:g}", files_.summary.steps, time)
-                                    : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
-                                                  files_.summary.steps, time, options_.folder.string(), last_.reason);
+    const std::string message =
+        status == kDone ? fmt::format("{} steps to time {:g}{}", files_.summary.steps, time, reuse_account())
+                        : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
+                                      files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
     throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
@@ -116,6 +123,7 @@ void TimeLoop::step() {
 std::vector<IterationRecord> TimeLoop::note_attempt(const StepResult& result) {
   record_.evaluations += result.evaluations;
   record_.dem_steps += result.dem_steps;
+  reuse_of_step_.answers += result.reused;
   std::vector<IterationRecord> table;
   for (const Iteration& i : result.table) {
     record_.dem_seconds += i.engine_seconds;
@@ -155,6 +163,12 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_.residual = last_.table.back().residual;
   record_.wall_seconds = files_.wall();
   record_.monitors = monitor_values(case_, problem_.formulation(), now);
+  reuse_of_step_.error = last_.table.back().reuse_error;
+  if (reuses()) {
+    record_.monitors.push_back(static_cast<double>(reuse_of_step_.answers));
+    record_.monitors.push_back(reuse_of_step_.error);
+  }
+  reuse_ = {reuse_.answers + reuse_of_step_.answers, std::max(reuse_.error, reuse_of_step_.error)};
   files_.add(record_);
   files_.log.step(record_, table, done);
   if (last_.best_accepted)
@@ -162,11 +176,27 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
         fmt::format("step {} accepted above the tolerance: residual {:.1e}", record_.step, record_.residual));
   size_.accepted(last_.iterations() <= case_.control.max_iterations_to_grow);
   record_ = {};
+  reuse_of_step_ = {};
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   const int checkpoint_every = case_.output.checkpoint_every;
   if (checkpoint_every > 0 && files_.summary.steps % checkpoint_every == 0) write_state();
   files_.whole(last_checkpoint_);
   whole_time_ = now.time;
+}
+
+/// Of history.csv, beside those of every run.
+std::vector<std::string> TimeLoop::columns() const {
+  std::vector<std::string> names = monitor_names(case_);
+  if (reuses()) names.insert(names.end(), {"reused", "reuse_error"});
+  return names;
+}
+
+/// What learned tangents have spared the points, and what it may have cost.
+std::string TimeLoop::reuse_account() const {
+  if (!reuses()) return "";
+  const double answers = static_cast<double>(files_.summary.evaluations) * static_cast<double>(points_.size());
+  return fmt::format("; {:.1f} % of the answers from learned tangents, their error at most {:.1e} of the forces",
+                     100 * static_cast<double>(reuse_.answers) / answers, reuse_.error);
 }
 
 std::string TimeLoop::place(std::size_t point) const {
@@ -186,6 +216,8 @@ void TimeLoop::write_state() {
   control_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back(
       "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
+  if (reuses())
+    checkpoint.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
   checkpoint.states = points_.save();
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
   last_checkpoint_ = files_.summary.steps;
@@ -203,6 +235,10 @@ void TimeLoop::restart() {
   files_.whole(last_checkpoint_);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
+  if (reuses()) {
+    const auto& reuse = find_array(resumed_.arrays, "run.reuse");
+    reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
+  }
   files_.log.start_from(resumed_.time / case_.control.end_time);
   files_.log.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
   resumed_ = {};

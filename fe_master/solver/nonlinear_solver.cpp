@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -78,7 +79,9 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       last_{0, Eigen::VectorXd::Zero(formulation.unknowns()), Eigen::VectorXd::Zero(formulation.multipliers()),
             Eigen::VectorXd::Zero(formulation.unknowns()), 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
+      reuse_(parameters.reuse_below, points.size()),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
+  assert(parameters.reuse_below == 0 || parameters.answer_at == 1);
   femxdem::commit(points_, committed_.responses);
   committed_.internal = assembler_.force(committed_.configuration(), stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
@@ -98,7 +101,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
     Iteration& now = result.table.emplace_back();
     if (!evaluate(trial, result)) return result;
     const Eigen::VectorXd residual = scaled_residual(trial);
-    now.residual = residual.norm();
+    now.residual = residual.norm() + now.reuse_error;
     now.element = largest(of_elements(residual));
     history.add(now.residual);
     if (result.reason = history.hopeless(operators_.memoryless()); !result.reason.empty()) break;
@@ -117,6 +120,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
       commit(trial, dt);
       return result;
     }
+    if (now.residual - now.reuse_error <= parameters_.tolerance) reuse_.stop();
     if (now.residual <= history.least()) best = trial;
     z = unknowns(trial);
     change = accelerate.change(z, *correction);
@@ -131,6 +135,7 @@ void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
   points_.begin_step();
   points_.start_from(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_));
   operators_.begin_step(committed_.F, committed_.responses);
+  reuse_.begin_step();
   factorised_in_step_ = false;
   trial.time = trial_time(dt);
   predict(trial, dt);
@@ -185,7 +190,8 @@ bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
   Iteration& now = result.table.back();
   const auto start = std::chrono::steady_clock::now();
   trial.F = formulation_.deformation(trial.x);
-  trial.responses = points_.evaluate(trial.F, operators_.wanted());
+  const std::vector<Tensor2> asked = reuse_.asked(trial.F);
+  trial.responses = points_.evaluate(asked, operators_.wanted());
   ++result.evaluations;
   for (const Response& r : trial.responses) {
     if (r.failure) {
@@ -197,15 +203,28 @@ bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
     now.engine_seconds += r.report["engine_seconds"];
     now.longest_point = std::max(now.longest_point, r.report["seconds"]);
   }
-  operators_.learn(trial.F, trial.responses);
+  reuse_.judge(operators_.learn(asked, trial.responses));
   if (const int probes = operators_.probe(points_, trial.F, trial.responses); probes > 0) {
     result.evaluations += probes + 1;
     trial.responses = points_.evaluate(trial.F, operators_.wanted());  // the trial to be committed is the last one
   }
+  reuse_.answer(trial.F, trial.responses, operators_);
   trial.internal = assembler_.force(trial.configuration(), stresses(trial.responses));
   trial.external = loads_.external_force(trial.x, trial.time, trial.load_factor);
+  result.reused += reuse_.count();
+  now.reuse_error = reuse_error(trial);
+  if (reuse_.count() > 0) now.note = fmt::format("{} answers reused, error {:.1e}", reuse_.count(), now.reuse_error);
   now.evaluate_seconds = seconds_since(start);
   return true;
+}
+
+/// Out-of-balance force that belongs to what learned tangents add to reused answers, times their misfit in this step.
+double NonlinearSolver::reuse_error(const Equilibrium& trial) const {
+  if (reuse_.count() == 0) return 0;
+  Equilibrium off = trial;
+  const Eigen::VectorXd without = assembler_.force(trial.configuration(), reuse_.unmoved());
+  off.internal += reuse_.misfit() * (trial.internal - without);
+  return (scaled_residual(off) - scaled_residual(trial)).norm();
 }
 
 /// Solves K dx = residual - constraints at x for the free unknowns, K of the state `at`; `change`: of the prescribed
@@ -328,8 +347,10 @@ bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
   const double residual = relative_residual(best);
   if (residual > parameters_.accept_best_factor * parameters_.tolerance) return false;
   Iteration& now = result.table.emplace_back();
+  reuse_.stop();
   if (!evaluate(best, result)) return false;
   now.residual = relative_residual(best);
+  if (now.residual > parameters_.accept_best_factor * parameters_.tolerance) return false;
   now.gap = gap(best);
   now.note = "best iterate, accepted above the tolerance";
   result.reason.clear();
@@ -349,6 +370,7 @@ void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistor
 
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   femxdem::commit(points_, trial.responses);
+  reuse_.commit();
   last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
            trial.external - committed_.external, trial.load_factor - committed_.load_factor};
   committed_ = std::move(trial);
@@ -362,6 +384,7 @@ void NonlinearSolver::commit(Equilibrium& trial, double dt) {
 void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);
   operators_.save(arrays);
+  reuse_.save(arrays);
   arrays.emplace_back("solver.time",
                       std::vector<double>{committed_.time, last_.dt, committed_.load_factor, last_.load_factor, time_});
   add(arrays, "solver.x", committed_.x);
@@ -382,6 +405,7 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
 void NonlinearSolver::load(const NamedArrays& arrays) {
   formulation_.load(arrays);
   operators_.load(arrays);
+  reuse_.load(arrays);
   const auto& time = find_array(arrays, "solver.time");
   committed_.time = time.at(0);
   committed_.load_factor = time.at(2);
@@ -406,7 +430,8 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
 SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements) {
   if (!is_given(parameters.tolerance)) parameters.tolerance = volume_elements ? 5e-3 : 1e-8;
   if (!is_given(parameters.displacement_tolerance)) parameters.displacement_tolerance = volume_elements ? 0.1 : 1e-6;
-  if (!is_given(parameters.qn_first)) parameters.qn_first = volume_elements ? 0 : 1;
+  if (!is_given(parameters.qn_first)) parameters.qn_first = volume_elements ? 0.5 : 1;
+  if (!is_given(parameters.qn_scatter)) parameters.qn_scatter = volume_elements ? 0.1 : 0;
   return parameters;
 }
 

@@ -14,16 +14,18 @@
 #include "material_points.hpp"
 #include "mid_step_points.hpp"
 #include "point_operators.hpp"
+#include "reused_answers.hpp"
 #include "solver_parameters.hpp"
 
 namespace femxdem {
 
 /// One equilibrium iteration: one evaluation of all points (and its probes), and the correction that it asks for.
 struct Iteration {
-  double residual = 0;    ///< free forces over reactions and external forces [-]
-  double correction = 0;  ///< displacement correction over the step's displacement [-]
-  double gap = 0;         ///< constraints: second gradient over the step's micro gradient, measure over its change [-]
-  int element = 0;        ///< whose nodes are farthest out of balance
+  double residual = 0;     ///< free forces over reactions and external forces, and reuse_error [-]
+  double reuse_error = 0;  ///< what the error of answers from learned tangents may add to the residual, estimated [-]
+  double correction = 0;   ///< displacement correction over the step's displacement [-]
+  double gap = 0;          ///< constraints: second gradient over the step's micro gradient, measure over its change [-]
+  int element = 0;         ///< whose nodes are farthest out of balance
   double engine_seconds = 0;    ///< inside the DEM engine, all points [s]
   double longest_point = 0;     ///< the busiest point [s]
   double evaluate_seconds = 0;  ///< wall time of the evaluation [s]
@@ -37,6 +39,7 @@ struct StepResult {
   bool best_accepted = false;  ///< accepted above the tolerance, below accept_best_factor times it
   int evaluations = 0;         ///< VE evaluations: every point strained once
   double dem_steps = 0;        ///< DEM steps of all points
+  long reused = 0;             ///< answers of points from their learned tangents (ReusedAnswers)
   std::vector<Iteration> table;
   std::string reason;              ///< why it did not converge, one sentence
   std::optional<Failure> failure;  ///< of a point, when that is the reason
@@ -100,6 +103,7 @@ class NonlinearSolver {
   void predict(Equilibrium& trial, double dt);
   void start_at_random(Equilibrium& trial) const;
   bool evaluate(Equilibrium& trial, StepResult& result);
+  double reuse_error(const Equilibrium& trial) const;
   struct Correction {
     Eigen::VectorXd x;
     double load_factor = 0;
@@ -138,6 +142,7 @@ class NonlinearSolver {
   Increment last_;
   std::optional<MeasureTarget> target_;  // of the step under way
   PointOperators operators_;
+  ReusedAnswers reuse_;
   double penalty_;  // r of the augmented Lagrangian [Pa]
 };
 

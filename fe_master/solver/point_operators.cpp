@@ -22,7 +22,9 @@ PointOperators::PointOperators(const SolverParameters& parameters, std::span<con
       components_(static_cast<int>(components.size())),
       F_n_(reference.size(), Tensor2::Identity()) {
   const double first = is_given(parameters.qn_first) ? parameters.qn_first : 1;
-  const LearningLimits limits{parameters.qn_min, parameters.qn_max, parameters.qn_skew, first, parameters.qn_noise};
+  const double scatter = is_given(parameters.qn_scatter) ? parameters.qn_scatter : 0;
+  const LearningLimits limits{parameters.qn_min, parameters.qn_max,  parameters.qn_skew, first,
+                              scatter,           parameters.qn_noise};
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
     elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));
@@ -49,13 +51,19 @@ void PointOperators::begin_step(std::span<const Tensor2> F, std::span<const Resp
   }
 }
 
-void PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+Misfit PointOperators::learn(std::span<const Tensor2> F, std::span<const Response> responses) {
+  Misfit sum;
   for (std::size_t p = 0; p < responses.size(); ++p) {
-    if (parameters_.global_operator == GlobalOperator::quasi_newton) learned_[p].learn(F[p], responses[p].stress);
+    if (parameters_.global_operator == GlobalOperator::quasi_newton) {
+      const Misfit misfit = learned_[p].learn(F[p], responses[p].stress);
+      sum.missed += misfit.missed;
+      sum.expected += misfit.expected;
+    }
     if (symmetric() && parameters_.refresh == Refresh::iteration) {
       elastic_[p] = parameters_.operator_scale * responses[p].stiffness;
     }
   }
+  return sum;
 }
 
 int PointOperators::probe(MaterialPoints& points, std::span<const Tensor2> F, std::span<const Response> responses) {

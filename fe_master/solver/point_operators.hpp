@@ -34,8 +34,12 @@ class PointOperators {
 
   /// Start of a step from the committed deformation gradients and responses.
   void begin_step(std::span<const Tensor2> F, std::span<const Response> responses);
-  /// Takes note of a trial's responses.
-  void learn(std::span<const Tensor2> F, std::span<const Response> responses);
+  /// Takes note of a trial's responses. The misfit of all points, where their tangents learn (quasi_newton).
+  Misfit learn(std::span<const Tensor2> F, std::span<const Response> responses);
+  /// Stress of a point at F, by its learned tangent, where it was `stress` at `from` [Pa].
+  Tensor2 predict(std::size_t point, const Tensor2& F, const Tensor2& from, const Tensor2& stress) const {
+    return learned_[point].predict(F, from, stress);
+  }
   /// perturbation: evaluates the probes about the trial F, whose responses follow; returns the number of evaluations.
   int probe(MaterialPoints& points, std::span<const Tensor2> F, std::span<const Response> responses);
   /// dP/dF of all points at a trial [Pa].

@@ -2,6 +2,7 @@
 
 #include "../material_points_contract.hpp"
 #include "compact_volume_elements.hpp"
+#include "engine_choice.hpp"
 #include "errors.hpp"
 #include "python_volume_elements.hpp"
 
@@ -132,6 +133,29 @@ TEST(CompactVolumeElements, ThreadsAndSharingChangeNoBit) {
   EXPECT_FALSE(contract::same_bits(parted[0].stress, parted[1].stress));
 }
 
+TEST(CompactVolumeElements, WhatTheLastTrialHasStrainedIsNotStrainedAgain) {
+  CompactCells cells(3, {.threads = 2, .check_share = 0, .evidence = {}});
+  CompactCells others(3, {.threads = 2, .check_share = 0, .evidence = {}});
+  const auto F = gradients(3, 1e-3);
+  auto G = F;
+  G[1] = part(F, 0.9)[1];
+  const auto first = contract::trial(cells.points, F), second = cells.points.evaluate(G, Operator::elastic);
+  contract::trial(others.points, F);
+  others.points.evaluate(part(F, 0.7), Operator::none);  // nothing of it is asked for again
+  expect_same_bits(others.points.evaluate(G, Operator::elastic), second);
+  for (const std::size_t kept : {0, 2}) {
+    EXPECT_TRUE(contract::same_bits(first[kept].stress, second[kept].stress)) << kept;
+    EXPECT_EQ(second[kept].report["dem_steps"], 0) << kept;
+  }
+  EXPECT_GT(second[1].report["dem_steps"], 0);
+  cells.points.commit();
+  others.points.commit();
+  EXPECT_EQ(cells.points.reports()[0]["dem_steps"], first[0].report["dem_steps"]) << "of the state, however it came";
+  const auto further = contract::trial(cells.points, part(F, 1.2));
+  expect_same_bits(further, contract::trial(others.points, part(F, 1.2)));
+  for (const Response& response : further) EXPECT_GT(response.report["dem_steps"], 0);
+}
+
 /// A state of compact cells goes on in YADE, and back.
 TEST(CompactVolumeElements, StatesGoFromEngineToEngine) {
   CompactCells compact(1);
@@ -147,14 +171,30 @@ TEST(CompactVolumeElements, StatesGoFromEngineToEngine) {
   compact.points.commit();
   yade.load(compact.points.save());
   const auto ours = contract::trial(compact.points, F), yades = contract::trial(yade, F);
-  EXPECT_LE((ours[0].stress - yades[0].stress).norm(), 1e-14 * ours[0].stress.norm()) << "YADE sums in its own order";
-  EXPECT_EQ(ours[0].report["contacts"], yades[0].report["contacts"]);
-  EXPECT_EQ(ours[0].report["dem_steps"], yades[0].report["dem_steps"]);
+  expect_same_bits(ours, yades);
   yade.commit();
+  compact.points.commit();
   CompactCells back(1);
   back.points.load(yade.save());
   const auto further = contract::trial(back.points, part(F, 1.2));
-  EXPECT_FALSE(further[0].failure);
+  expect_same_bits(further, contract::trial(compact.points, part(F, 1.2)));
+  expect_same_bits(further, contract::trial(yade, part(F, 1.2)));
+}
+
+/// A checkpoint of another packing than the case's is refused in either engine.
+TEST(CompactVolumeElements, AStateOfAnotherOriginIsRefused) {
+  CompactCells compact(1);
+  Cells yade(1);
+  VeState saved = decode(compact.points.save()[0]).value();
+  ++saved.origin;
+  for (LocalPoints* points : {static_cast<LocalPoints*>(&compact.points), static_cast<LocalPoints*>(&yade.points)}) {
+    try {
+      points->load({encode(saved)});
+      ADD_FAILURE() << "it was taken";
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find("another packing than the case's"), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST(CompactVolumeElements, DamagedStatesAreRefused) {
@@ -166,6 +206,77 @@ TEST(CompactVolumeElements, DamagedStatesAreRefused) {
     EXPECT_THROW(cells.points.load({damaged}), UserError) << at;
     EXPECT_THROW(cells.points.load({state.substr(0, at)}), UserError) << at;
   }
+}
+
+/// The same packing under the paper's law, with dashpots and adhesive new contacts.
+const std::string& packing_of_the_paper() {
+  static const std::string state = [] {
+    std::string specification = kSpecification;
+    for (const auto& [old, by] : {std::pair{"\"cohesion\": 0.0", "\"cohesion\": 1.0, \"viscous_damping\": 0.1"},
+                                  {"\"adhesive\"", "\"paper\""},
+                                  {"\"frictional\"", "\"adhesive\""}})
+      specification.replace(specification.find(old), std::string(old).size(), by);
+    WorkerProcess worker({});
+    return PythonVolumeElements(worker, {}).make_template(specification).state;
+  }();
+  return state;
+}
+
+struct CellsOfThePaper {
+  explicit CellsOfThePaper(std::size_t count, int threads = 1, VolumeElementOptions options = switched())
+      : worker({}), points(worker, std::move(options), {.threads = threads, .check_share = 1, .evidence = {}}) {
+    points.add(packing_of_the_paper(), count);
+  }
+  static VolumeElementOptions switched() {
+    VolumeElementOptions options;
+    options.start_at_rest = true;
+    options.hold_steps = 7;
+    return options;
+  }
+  WorkerProcess worker;
+  CompactVolumeElements points;
+};
+
+/// With every trial from rest to rest, a path in two trials is another path: only without the switches.
+TEST(PaperLaw, Contract) {
+  VolumeElementOptions options;
+  options.min_steps = 1;
+  CellsOfThePaper cells(3, 2, options);
+  contract::check_local(cells.points, tolerances());
+}
+
+TEST(PaperLaw, SwitchesThreadsAndARestartGiveTheSameBitsAndYadeRepeatsNothing) {
+  CellsOfThePaper one(3, 1), two(3, 2);
+  const auto F = gradients(3, 1e-3);
+  for (const double fraction : {0.4, 0.8}) {
+    const auto a = contract::trial(one.points, part(F, fraction));
+    expect_same_bits(a, contract::trial(two.points, part(F, fraction)));
+    EXPECT_GE(a[0].report["dem_steps"], 17) << "the hold counts";
+    one.points.commit();
+    two.points.commit();
+  }
+  CellsOfThePaper again(3);
+  again.points.load(two.points.save());
+  expect_same_bits(contract::trial(one.points, F), contract::trial(again.points, F));
+  EXPECT_EQ(one.points.engine_check().trials, 0);
+  CellsOfThePaper plain(3, 1, {}), switched(3);
+  EXPECT_FALSE(contract::same_bits(contract::trial(plain.points, part(F, 0.4))[0].stress,
+                                   contract::trial(switched.points, part(F, 0.4))[0].stress));
+}
+
+TEST(PaperLaw, TheChoiceOfTheEngineSaysThatYadeHasItNot) {
+  WorkerProcess worker({});
+  const auto sentence = [&](const std::vector<std::string>& states) {
+    const EngineVerdict verdict = choose_engine(EngineChoice::automatic, worker, states);
+    EXPECT_EQ(verdict.engine, EngineKind::compact);
+    return verdict.sentence;
+  };
+  const std::string alone = sentence({packing_of_the_paper()}), both = sentence({packing(), packing_of_the_paper()});
+  EXPECT_NE(alone.find("1 of 1 templates have ve.contact_law = \"paper\", which YADE has not"), std::string::npos)
+      << alone;
+  EXPECT_EQ(alone.find("to the bit"), std::string::npos) << alone;
+  EXPECT_NE(both.find("every other template equals YADE's to the bit"), std::string::npos) << both;
+  EXPECT_NE(both.find("1 of 2 templates"), std::string::npos) << both;
 }
 
 }  // namespace

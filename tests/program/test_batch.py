@@ -107,6 +107,29 @@ class Environments(unittest.TestCase):
         self.assertNotIn(b"\033", said)
         self.assertIn(b"step    2", said)
 
+    def terminal(self, *flags, **env):
+        """What a terminal gets of a short run."""
+        ours, theirs = os.openpty()
+        command = [str(FEMXDEM), "run", str(LAW), "--out", "progress", "--overwrite", "--set", "control.end_time=0.06", *flags]
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "SLURM_"))}
+        subprocess.run(command, cwd=FOLDER, stdout=theirs, timeout=100, env={**environment, "TERM": "xterm", **env}, check=True)
+        os.close(theirs)
+        said = b""
+        try:
+            while more := os.read(ours, 100000):
+                said += more
+        except OSError:  # nobody writes to it any more
+            os.close(ours)
+        return said
+
+    def test_progress_is_one_line_on_a_terminal_of_a_person_or_where_asked(self):
+        for flags, env, updates in (((), {}, True), ((), {"SLURM_JOB_ID": "7"}, False), (["--no-progress"], {}, False),
+                                    (["--progress"], {"SLURM_JOB_ID": "7"}, True), ((), {"TERM": "dumb"}, False)):
+            said = self.terminal(*flags, **env)
+            self.assertEqual(b"\033[K\rstep    3" in said, updates, (flags, env))
+            self.assertEqual(b"\nstep    3" in said, not updates, (flags, env))
+            self.assertIn(b"left 0 s", said)
+
 
 class Restarts(unittest.TestCase):
     def test_keys_that_differ_and_a_later_end(self):

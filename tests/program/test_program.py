@@ -18,6 +18,7 @@ FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
 TIME_COLUMNS = ("dem_seconds", "wall_s")
 FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
 CACHE = Path(FOLDER.name) / "packings"
+IN_ORDER = ("--set", "ve.sorted_contacts=true")  # sums of forces have the bits of compact cells
 YADE = ("--set", 've.engine="yade"')  # whose trials are processes
 
 
@@ -39,6 +40,11 @@ def history(out):
     """Rows of history.csv as text, without the columns that depend on the clock."""
     with open(out / "history.csv") as file:
         return [{k: v for k, v in row.items() if k not in TIME_COLUMNS} for row in csv.DictReader(file)]
+
+
+def engine(out):
+    """Which engine the run had."""
+    return json.loads((out / "summary.json").read_text())["engine"]
 
 
 def workers():
@@ -99,6 +105,29 @@ class Program(unittest.TestCase):
             out, status, said = run(f"ranks{ranks}", ranks=ranks)
             self.assertEqual(status, 0, said)
             self.assertEqual(history(out), self.reference)
+
+    def test_both_engines_have_the_same_history(self):
+        out, status, said = run("yade", *YADE, *IN_ORDER)
+        self.assertEqual(status, 0, said)
+        self.assertEqual(engine(out), "yade")
+        self.assertEqual(history(out), self.reference)
+
+    def test_a_run_goes_on_in_the_other_engine_and_on_other_ranks_and_threads(self):
+        steps = ("--set", "control.step=0.125", "--set", "control.max_step=0.125")  # whose sums have no round-off
+        whole, half = (steps + ("--set", f"control.end_time={end}") for end in (0.75, 0.5))
+        out, status, said = run("exact_steps", *whole)
+        self.assertEqual(status, 0, said)
+        unscaled = lambda out: [row | {"load_factor": ""} for row in history(out)]  # it is the time over that of the end
+        expected = unscaled(out)
+        settings = {"compact": ("--set", "ve.threads=2"), "yade": YADE + IN_ORDER}
+        for before, after, ranks in (("compact", "compact", 3), ("compact", "yade", 2), ("yade", "compact", 2)):
+            name = f"{before}_{after}"
+            _, status, said = run(name, *half, *(settings["yade"] if before == "yade" else ()))
+            self.assertEqual(status, 0, said)
+            out, status, said = run(name, *whole, *settings[after], "--restart", ranks=ranks)
+            self.assertEqual(status, 0, said)
+            self.assertEqual(engine(out), after)
+            self.assertEqual(unscaled(out), expected, name)
 
     def test_killed_rank_leaves_no_worker_and_the_restart_equals_the_uninterrupted_run(self):
         out = Path(FOLDER.name) / "restart"

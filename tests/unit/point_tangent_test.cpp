@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "analytic_laws.hpp"
 #include "learned_tangent.hpp"
@@ -135,6 +136,31 @@ TEST(LearnedTangent, ThreeOrthogonalIncrementsTeachALinearLaw) {
   }
   EXPECT_LT((matrix_of(learned) - 0.5 * to_mandel(kC, kPlaneStrain)).norm(), kRoundOff * kC.norm());
   EXPECT_NEAR(learned.least_eigenvalue(), 0.5, 1e-12);
+}
+
+/// Distance from the law 0.5 C0 after steps of three nearly parallel pairs each, whose stress scatters by a tenth.
+double missed_under_scatter(double scatter) {
+  LearnedTangent learned(kC, kPlaneStrain, {.skew = 10, .first = scatter > 0 ? 0.5 : 0, .scatter = scatter});
+  std::mt19937 generator(7);
+  const auto random = [&] { return 2.0 * generator() / static_cast<double>(std::mt19937::max()) - 1; };
+  double missed = 0;
+  for (int step = 0; step < 60; ++step) {
+    learned.begin_step(Tensor2::Identity(), Tensor2::Zero());
+    Tensor2 e = Tensor2::Zero(), stress = Tensor2::Zero();
+    for (double size = 1e-3; size > 1e-5; size /= 5) {
+      const Tensor2 change = size * strain(1 + 0.3 * random(), -2 + 0.3 * random(), 0.5 + 0.3 * random());
+      e += change;
+      stress += apply(0.5 * kC, change) + 0.1 * apply(0.5 * kC, size * strain(random(), random(), random()));
+      learned.learn(Tensor2::Identity() + e, stress);
+    }
+    if (step >= 20) missed += (matrix_of(learned) - 0.5 * to_mandel(kC, kPlaneStrain)).norm() / 40;
+  }
+  return missed / kC.norm();
+}
+
+TEST(LearnedTangent, IsNotTurnedByScatterOfNearlyParallelPairs) {
+  EXPECT_GT(missed_under_scatter(0), 0.08);
+  EXPECT_LT(missed_under_scatter(0.1), 0.05);
 }
 
 TEST(LearnedTangent, StaysWithinItsBounds) {

@@ -223,6 +223,21 @@ TEST_F(ResultsTest, BatchLogGetsPlainLinesAndTheFileTheTable) {
   EXPECT_NE(file.find(line), std::string::npos);
 }
 
+TEST_F(ResultsTest, ProgressThatIsAskedForIsOneLineThatUpdatesAndPlainInTheFile) {
+  fs::create_directories(folder_);
+  std::FILE* batch = std::fopen((folder_ / "batch").c_str(), "w");
+  {
+    Log log(folder_ / "log.txt", Existing::refuse, batch, true);
+    for (const int step : {1, 2}) log.step(record(step), {}, 0.5 * step);
+  }
+  std::fclose(batch);
+  const std::string terminal = text("batch"), file = text("log.txt");
+  EXPECT_EQ(terminal.find("\rstep    1"), 0u);
+  EXPECT_NE(terminal.find("\033[K\rstep    2"), std::string::npos);
+  EXPECT_EQ(std::count(terminal.begin(), terminal.end(), '\n'), 1);
+  EXPECT_EQ(file.find_first_of("\r\033"), std::string::npos);
+}
+
 TEST_F(ResultsTest, ResumedLogKeepsTheEarlierText) {
   fs::create_directories(folder_);
   std::FILE* nowhere = std::fopen("/dev/null", "w");

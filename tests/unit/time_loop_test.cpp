@@ -87,6 +87,25 @@ TEST_F(TimeLoopTest, ARestartEqualsTheUninterruptedRun) {
   EXPECT_EQ(rows(folder_), whole);
 }
 
+TEST_F(TimeLoopTest, ReusedAnswersAreCountedAndARestartGoesOnWithThem) {
+  Case c = block();
+  c.solver.tolerance = 1e-3;
+  c.solver.displacement_tolerance = 0.1;
+  c.solver.reuse_below = 0.5;
+  c.output.checkpoint_every = 4;
+  c.loads.back().component = Component::x;  // sheared
+  c.loads.back().value = 0.02;
+  const VonMisesLaw law{1000, 0.25, 2, 50, 0, 0};
+  ASSERT_EQ(run(c, law), kDone);
+  const auto whole = rows(folder_);
+  EXPECT_TRUE(whole.front().ends_with(",reused,reuse_error")) << whole.front();
+  const std::string log = text_of(folder_ / "log.txt");
+  EXPECT_NE(log.find(" % of the answers from learned tangents, their error at most "), std::string::npos);
+  EXPECT_EQ(log.find("; 0.0 % of the answers"), std::string::npos) << "some were reused";
+  EXPECT_EQ(run(c, law, Existing::resume), kDone);
+  EXPECT_EQ(rows(folder_), whole);
+}
+
 TEST_F(TimeLoopTest, ResultsAreNotOverwrittenUnasked) {
   const Case c = block();
   ASSERT_EQ(run(c, make_law(c.material)), kDone);

@@ -17,7 +17,7 @@ SPHERES = 60
 PACKING = {
     "source": "prepare", "spheres": SPHERES, "size_ratio": 1.5, "kappa": 500.0, "stiffness_ratio": 1.0, "friction": 0.5,
     "compaction_friction": 0.0, "cohesion": 0.0, "contact_law": "adhesive", "new_contacts": "frictional", "confining_stress": 1e5,
-    "mean_diameter": 1e-3, "density": 2600.0, "damping": 0.2, "seed": 1, "time_step_safety": 0.8
+    "mean_diameter": 1e-3, "density": 2600.0, "damping": 0.2, "seed": 1, "time_step_safety": 0.8, "viscous_damping": 0.0
 }  # fmt: skip
 
 
@@ -31,7 +31,8 @@ def packing(**changes):
 
 def users(source, path, **more):
     """Whole specification of a user's `script` or `scene`."""
-    return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **more}
+    limits = {"script_steps": 1_000_000, "script_seconds": 600.0}
+    return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **limits, **more}
 
 
 FRICTION = packing(contact_law="friction")

@@ -115,6 +115,12 @@ class States(unittest.TestCase):
             self.assertEqual(trial.save(), first)
         self.assertEqual(base.save(), before)
 
+    def test_a_cell_takes_no_more_room_than_the_larger_one_that_it_becomes(self):
+        small, large = sorted((cell("adhesive"), cell("soft, wide sizes")), key=lambda c: c.memory)
+        self.assertLess(small.memory, large.memory)
+        small.assign(large)
+        self.assertEqual(small.memory, large.memory)
+
     def test_a_loaded_state_goes_on_with_equal_bits(self):
         for name in SPECS:
             c = cell(name)
@@ -128,19 +134,19 @@ class States(unittest.TestCase):
 
     def test_what_is_not_a_state_is_refused(self):
         good = cell("bonded").save()
-        self.assertIsNone(compact_cell.why_invalid(good))
+        CompactCell.load(good)
         version = bytearray(good)
         version[8] += 1
         cut = (good[:-64], "bytes"), (good[:100], "truncated"), (b"", "truncated")
         for bad, word in (*cut, (bytes(version), "version")):
-            self.assertIn(word, compact_cell.why_invalid(bad))
             with self.assertRaisesRegex(compact_cell.UserError, word):
                 CompactCell.load(bad)
         rng = np.random.default_rng(0)
         for at in rng.integers(0, len(good), 200):
             flipped = bytearray(good)
             flipped[at] ^= 1 << int(rng.integers(8))
-            self.assertIsNotNone(compact_cell.why_invalid(bytes(flipped)), f"byte {at}")
+            with self.assertRaises(compact_cell.UserError, msg=f"byte {at}"):
+                CompactCell.load(bytes(flipped))
 
     def test_what_is_not_an_export_is_refused(self):
         good = exported("friction")
@@ -161,6 +167,22 @@ class States(unittest.TestCase):
                 engine().deform(ve, L, steps)
                 self.assertEqual(differences(c.to_scene(), compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
 
+    def test_yade_goes_on_from_its_own_archive_with_equal_bits(self):
+        """Forces found again would be right up to round-off: a contact that slides is scaled to its limit once more."""
+        for name, spec in SPECS.items():
+            ve = sorted_element(spec)
+            O, c = select(ve), cell(name)
+            for L in rates(c):
+                engine().deform(ve, L, 30)
+                archive, state = engine().save(ve), compact_scene.export(O)
+                other = engine().add(archive)
+                self.assertEqual(differences(state, compact_scene.export(O), ROUND_OFF | COUNTED_APART), [], name)
+                engine().deform(other, L, 5)
+                further = compact_scene.export(O)
+                engine().remove(other)
+                engine().deform(ve, L, 5)
+                self.assertEqual(differences(compact_scene.export(O), further, ROUND_OFF | COUNTED_APART), [], name)
+
     def test_a_state_does_not_fit_a_scene_of_other_spheres(self):
         ve = element(packing(spheres=60, contact_law="friction"))
         with self.assertRaisesRegex(RuntimeError, "100 spheres does not fit"):
@@ -176,6 +198,7 @@ class Reports(unittest.TestCase):
                 c.deform(L, 200)
                 stress, report, stretch = measure(ve)
                 np.testing.assert_allclose(c.stress(), stress, rtol=0, atol=1e-12 * np.abs(stress).max())
+                np.testing.assert_array_equal(c.stress(), compact_scene.stress(select(ve)))
                 np.testing.assert_array_equal(c.stretch(), stretch)
                 own = c.report()
                 self.assertEqual(set(own), set(FIELDS))
@@ -183,7 +206,6 @@ class Reports(unittest.TestCase):
                 self.assertAlmostEqual(own["sliding_contacts"], report["sliding_contacts"], delta=either_way + 1e-12)
                 for field in set(FIELDS) - {"seconds", "engine_seconds", "sliding_contacts"}:
                     np.testing.assert_allclose(own[field], report[field], rtol=1e-11, atol=1e-13, err_msg=field)
-                self.assertEqual(own["unbalanced_force"], c.unbalanced_force())
             for key, value in engine().info(ve).items():
                 np.testing.assert_allclose(c.info()[key], value, rtol=1e-12, err_msg=key)
 
@@ -252,36 +274,77 @@ class Reports(unittest.TestCase):
         self.assertEqual(c.save(), before, "one stiffness for ever: the step is kept")
 
 
+class Flips(unittest.TestCase):
+    """Simple shear to F_12 = 3: a cell flips at about 0.5, 1.5 and 2.5."""
+
+    @staticmethod
+    def shear(c):
+        """Velocity gradient [1/s] and the steps in which F_12 grows by 0.1."""
+        rate = 0.1 / c.info()["time_scale"]
+        return np.array([[0, rate, 0], [0, 0, 0], [0, 0, 0]]), round(0.1 / (rate * c.info()["time_step"]))
+
+    @staticmethod
+    def without_flips(O, steps):
+        """What deform does, but for them."""
+        for _ in range(steps):
+            O.step()
+        contact_laws.to_forces(engine().O)
+
+    def test_both_engines_flip_at_the_same_steps_with_equal_bits(self):
+        for name in ("adhesive", "friction"):
+            ve, c = sorted_element(SPECS[name]), cell(name)
+            (L, steps), O, bases = self.shear(c), select(ve), set()
+            H = compact_scene.Scene(c.to_scene()).H
+            for _ in range(31):
+                c.deform(L, steps)
+                engine().deform(ve, L, steps)
+                self.assertEqual(differences(c.to_scene(), compact_scene.export(O)), [], name)
+                F = np.array(c.stretch())
+                basis = np.linalg.solve(F @ H, compact_scene.Scene(c.to_scene()).H)
+                np.testing.assert_allclose(basis, np.rint(basis), rtol=0, atol=1e-9)
+                bases.add(tuple(np.rint(basis).astype(int).ravel()))
+            self.assertGreater(F[0, 1], 3)
+            self.assertEqual(len(bases), 4, "three flips")
+
+    def test_stress_is_continuous_across_every_flip(self):
+        """Of YADE's cell and of a compact one made from it, at once and over the steps after it, within 1e-9."""
+        for name in ("adhesive", "friction"):
+            ve = sorted_element(SPECS[name])
+            (L, steps), O, flips = self.shear(cell(name)), select(ve), 0
+            for _ in range(31):
+                engine().deform(ve, L, 1)
+                self.without_flips(O, steps)
+                long = CompactCell.from_scene(compact_scene.export(O))
+                short, before = long.copy(), measure(ve)[0]
+                if not short.flip():
+                    continue
+                flips += 1
+                atol = 1e-9 * np.abs(before).max()
+                np.testing.assert_allclose(short.stress(), before, rtol=0, atol=atol)
+                self.assertEqual(len(short), len(long))
+                archive = engine().save(ve)
+                self.without_flips(O, 5)
+                beside = measure(ve)[0]
+                engine().replace(ve, archive)
+                self.assertNotEqual(np.array(O.cell.flipCell()).tolist(), np.eye(3).tolist())
+                np.testing.assert_allclose(measure(ve)[0], before, rtol=0, atol=atol)
+                engine().deform(ve, L, 5)
+                short.deform(L, 5)
+                np.testing.assert_allclose(measure(ve)[0], beside, rtol=0, atol=atol)
+                np.testing.assert_allclose(short.stress(), beside, rtol=0, atol=atol)
+            self.assertEqual(flips, 3, name)
+
+    def test_a_short_cell_stays(self):
+        c = cell("adhesive")
+        self.assertFalse(c.flip())
+
+
 class Limits(unittest.TestCase):
     def test_a_cell_that_becomes_too_narrow_is_a_failure(self):
         c = cell("friction")
         with self.assertRaisesRegex(RuntimeError, "too narrow"):
             for _ in range(500):
                 c.deform(np.diag([-1.0, 1.0, 0.0]) * 0.3 / c.info()["time_scale"], 100)
-
-    def test_a_long_shear_goes_on_in_flipped_cells(self):
-        """F_12 = 3; at every hundredth the cell is flipped by hand: stress and contacts stay, a path beside it too."""
-        c = cell("adhesive")
-        rate, dt, flips = 2e-2 / c.info()["time_scale"], c.info()["time_step"], 0
-        L = np.array([[0, rate, 0], [0, 0, 0], [0, 0, 0]])
-        steps = round(0.05 / (rate * dt))
-        for _ in range(60):
-            c.deform(L, steps)
-            flipped = c.copy()
-            if flipped.flip():
-                flips += 1
-                a, b = (compact_scene.Scene(v.to_scene()) for v in (c, flipped))
-                self.assertFalse((a.ids != b.ids).any() or (a.x != b.x).any())
-                self.assertTrue((a.shift != b.shift).any())
-                for _ in range(2):
-                    scale = np.abs(c.stress()).max()
-                    np.testing.assert_allclose(flipped.stress(), c.stress(), rtol=0, atol=1e-9 * scale)
-                    flipped.deform(L, 5)
-                    c.deform(L, 5)
-        self.assertGreater(flips, 10)
-        np.testing.assert_allclose(c.stretch(), np.eye(3) + np.array(L) * (c.stretch()[0, 1] / rate), rtol=0, atol=1e-12)
-        self.assertGreater(c.stretch()[0, 1], 2.9)
-        self.assertFalse(c.copy().flip() and c.flip() and c.flip(), "the shortest cell has none shorter")
 
     def test_no_steps_change_nothing(self):
         c = cell("friction")

@@ -89,7 +89,7 @@ class Models(unittest.TestCase):
                 ve, _ = element(model)
                 stress = measure(ve)[0]
                 C = stiffness(ve)
-                probed = probing.stiffness(select(ve), engine()._love_weber, engine()._to_forces)
+                probed = probing.stiffness(select(ve), engine()._love_weber)
                 error = np.linalg.norm(C - probed) / np.linalg.norm(probed)
                 print(f"{model}: stress {np.diag(stress)}, Eq. (2) against probes {error:.2%}")
                 np.testing.assert_allclose(np.diag(stress), -1e5, rtol=0.03)

@@ -104,17 +104,5 @@ class Numbers(unittest.TestCase):
         self.assertEqual(ids, sorted(ids))
 
 
-class Refusals(unittest.TestCase):
-    def test_senseless_values(self):
-        for wrong, sentence in (
-            ({"contact_law": "glue"}, 've.contact_law = "glue" is unknown'),
-            ({"contact_law": "friction", "cohesion": 1.0}, "ve.cohesion > 0 needs"),
-            ({"spheres": 3}, "spheres >= 20"),
-            ({"kappa": -1.0}, "kappa > 0"),
-        ):
-            with self.subTest(wrong), self.assertRaisesRegex(ValueError, sentence):
-                packing.prepare(None, cells.packing(**wrong))
-
-
 if __name__ == "__main__":
     unittest.main()

@@ -103,7 +103,7 @@ class Packing(unittest.TestCase):
         import probing
 
         before = engine().save(self.ve)
-        C = probing.stiffness(select(self.ve), engine()._love_weber, engine()._to_forces)
+        C = probing.stiffness(select(self.ve), engine()._love_weber)
         error = np.linalg.norm(C - self.affine) / np.linalg.norm(self.affine)
         print(f"probed stiffness against Eq. (2): {error:.2%}")
         self.assertLess(error, 0.01)

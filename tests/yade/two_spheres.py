@@ -2,6 +2,7 @@
 
 import numpy as np
 
+import compact_scene
 import contact_laws
 from cells import engine
 
@@ -72,9 +73,56 @@ class Pair:
         return i.phys.shearForce.norm() if i else 0.0
 
 
-def normal_path(law, path, overlap=4e-6, new_adhesion=None):
+class PaperPair:
+    """The same under the paper's law, in a compact cell, which moves the sphere by its own deformation."""
+
+    def __init__(self, overlap, new_adhesion=None, viscous_damping=0.0):
+        pair = Pair("adhesive", overlap)
+        contact_laws.note_paper_law(pair.O, viscous_damping)
+        if new_adhesion:
+            contact_laws.make_new_contacts_adhesive(pair.O, *new_adhesion)
+        self.cell = compact_scene.cell(pair.O)
+
+    def move(self, dx, dy):
+        """A pure strain: neither sphere turns, and no velocity is left over."""
+        x, y, _ = self._branch
+        a, b = np.linalg.solve([[x, y], [0, x]], [dx, dy])
+        self.cell.rest()
+        self.cell.deform(np.array([[a, b, 0], [b, 0, 0], [0, 0, 0]]) / self.cell.info()["time_step"], 1)
+
+    @property
+    def _scene(self):
+        return compact_scene.Scene(self.cell.to_scene())
+
+    @property
+    def _branch(self):
+        x = self._scene.x
+        return x[1] - x[0]
+
+    @property
+    def contact(self):
+        return self.cell.contacts > 0
+
+    @property
+    def overlap(self):
+        return DIAMETER - np.linalg.norm(self._branch)
+
+    @property
+    def normal_force(self):
+        return float(self._scene.normal_force[0]) if self.contact else 0.0
+
+    @property
+    def shear_force(self):
+        return float(np.linalg.norm(self._scene.shear[0])) if self.contact else 0.0
+
+
+def pair_of(law, overlap, **more):
+    return PaperPair(overlap, **more) if law == contact_laws.PAPER else Pair(law, overlap, **more)
+
+
+def normal_path(law, path, overlap=4e-6, new_adhesion=None, **more):
     """Rows (overlap, normal force, contact?) along `path`, increments of the overlap in STEPs."""
-    pair, rows = Pair(law, overlap, new_adhesion=new_adhesion), []
+    pair, rows = pair_of(law, overlap, new_adhesion=new_adhesion, **more), []
     for direction in path:
         pair.move(-direction * STEP, 0)
         rows.append((pair.overlap, pair.normal_force, pair.contact is not None))
@@ -87,7 +135,7 @@ def there_and_back(steps):
 
 def slide(law, overlap, path, kt=KN):
     """Rows (overlap, normal force, shear force) along `path`, tangential increments in STEPs, and the pair."""
-    pair, rows = Pair(law, overlap, kt), []
+    pair, rows = pair_of(law, overlap, **({} if law == contact_laws.PAPER else {"kt": kt})), []
     for direction in path:
         pair.move(0, direction * STEP)
         rows.append((pair.overlap, pair.normal_force, pair.shear_force))

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Two spheres under each contact law against its closed form: normal cycle, sliding cycle, loss, new contact.
+"""Two spheres under each contact law against its closed form: normal cycle, sliding cycle, loss, new contact, dashpot.
 
     validation/contact_laws/run.py [ROW ...] [--list] [--record]
 
@@ -21,21 +21,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import contact_laws
-from two_spheres import F_C, FRICTION, KN, STEP, normal_path, slide, slider, sliding_cycle, there_and_back
+from two_spheres import DIAMETER, F_C, FRICTION, KN, STEP, PaperPair, normal_path, slide, slider, sliding_cycle, there_and_back
 
 UNIT = F_C / KN  # [m]
+LAWS = (*contact_laws.LAWS, contact_laws.PAPER)
 OVERLAP = 4.03e-6  # [m]: no step ends on delta = 0 or delta = -f_c/kn
 TOLERANCE = 1e-6  # of f_c
 
 
 def normal_force(law, overlaps, bound=True, lost_at=0.0):
     """Closed form of the normal force [N] along `overlaps` [m]; an adhesive contact is lost at the overlap `lost_at` and
-    holds -f_c below 0 until then."""
+    holds -f_c below 0 until then, the paper's ends at 0."""
     forces = []
     for delta in overlaps:
-        limit = {"adhesive": lost_at, "bonded": -UNIT, "friction": 0.0}[law]
+        limit = {"adhesive": lost_at, "bonded": -UNIT, "friction": 0.0, "paper": 0.0}[law]
         bound = bound and delta > limit
-        if bound and law == "adhesive":
+        if bound and law in ("adhesive", "paper"):
             forces.append(max(KN * delta - F_C, -F_C))
         else:
             forces.append(KN * delta if bound else max(KN * delta, 0.0))
@@ -54,7 +55,7 @@ def row(quantity, measured, reference=0.0, tolerance=TOLERANCE):
 def normal_cycles(axes):
     """Opened until lost and closed again; what YADE does differently."""
     rows = []
-    for law in contact_laws.LAWS:
+    for law in LAWS:
         path = normal_path(law, there_and_back(90), OVERLAP)
         lost_at = -UNIT if law == "adhesive" else 0.0
         closed = normal_force(law, path[:, 0], lost_at=lost_at)
@@ -78,18 +79,19 @@ def sliding_cycles(axes):
     """Each law above its own limit, and the adhesive one also where its net force is attractive."""
     rows = []
     for law, overlap, label in (("friction", 3e-6, "friction"), ("adhesive", 5e-6, "adhesive, compressed"),
-                                ("adhesive", 1e-6, "adhesive, attractive")):
+                                ("adhesive", 1e-6, "adhesive, attractive"),
+                                ("paper", 5e-6, "paper, compressed"), ("paper", 1e-6, "paper, attractive")):
         path = sliding_cycle(3 * FRICTION * overlap)
         found, _ = slide(law, overlap, path)
         limit = FRICTION * KN * found[:, 0]
         closed = slider(found[:, 0], path, limit)
         rows.append(row(f"{label}: sliding cycle, shear force / f_c", deviation(found[:, 2], np.abs(closed))))
-        attraction = F_C if law == "adhesive" else 0.0
+        attraction = 0.0 if law == "friction" else F_C
         slides = np.abs(closed) >= limit * (1 - 1e-9)
-        kept = ~slides if label.endswith("attractive") else np.ones(len(path), bool)
+        kept = ~slides if label == "adhesive, attractive" else np.ones(len(path), bool)
         rows.append(row(f"{label}: normal force meanwhile / f_c",
                         deviation(found[kept, 1], KN * found[kept, 0] - attraction)))
-        if label.endswith("attractive"):
+        if label == "adhesive, attractive":
             law_says = KN * found[slides, 0] - attraction
             rows.append(row(f"{label}: normal force in steps that slide over the law's (YADE passes none)",
                             float((found[slides, 1] / law_says).max()), 0.0, 0.0))
@@ -119,8 +121,30 @@ def new_contacts(axes):
         known = stuck | (np.arange(len(path)) < touching[0]) if adhesion else np.full(len(path), True)
         rows.append(row(f"{label}: deviation / f_c", deviation(path[known, 1], closed[known])))
         draw(axes, path[:, 0] / UNIT, closed / F_C, path[:, 1] / F_C, label)
+    path = normal_path("paper", [1] * 60 + [-1] * 80, -1.03e-6, (F_C, FRICTION))
+    closed = np.where(path[:, 0] > 0, KN * path[:, 0] - F_C, 0.0)
+    rows.append(row("paper: new contact, adhesive from the first touch on: deviation / f_c", deviation(path[:, 1], closed)))
+    draw(axes, path[:, 0] / UNIT, closed / F_C, path[:, 1] / F_C, "paper, new contact, adhesive")
     axes.set(title="new contact of adhesive spheres", xlabel=r"overlap $\delta\, k_n/f_c$", ylabel=r"$f_n/f_c$")
     return rows
+
+
+def dashpot(axes):
+    """The paper's law with viscous damping: pressed together, drawn apart at one speed and at five times it, let go."""
+    mass, speed = 2600.0 * np.pi / 6 * DIAMETER**3, STEP / 1e-6
+    ratio = 0.5 * F_C / (speed * 2 * np.sqrt(KN * mass / 2))  # half of f_c at that speed
+    moves = np.array([1] * 30 + [0] * 5 + [-1] * 10 + [-5] * 6)
+    path = normal_path("paper", moves, 2.03e-6, viscous_damping=ratio)
+    repulsion = np.maximum(KN * path[:, 0] + 0.5 * F_C * moves, 0.0)
+    closed = np.where(path[:, 0] > 0, repulsion - F_C, 0.0)
+    draw(axes, path[:, 0] / UNIT, closed / F_C, path[:, 1] / F_C, "paper, with a dashpot")
+    axes.set(title="dashpot", xlabel=r"overlap $\delta\, k_n/f_c$", ylabel=r"$f_n/f_c$")
+    held = PaperPair(2.03e-6, viscous_damping=ratio)
+    held.move(-STEP, 0)
+    moving = held.normal_force
+    held.cell.hold(1)
+    return [row("paper with a dashpot: deviation / f_c", deviation(path[:, 1], closed), tolerance=1e-4),
+            row("what of its force a hold takes / f_c", float((moving - held.normal_force) / F_C), 0.5, 1e-4)]
 
 
 def draw(axes, x, closed, measured, label):
@@ -128,10 +152,11 @@ def draw(axes, x, closed, measured, label):
     axes.plot(x, measured, ".", color=line.get_color(), markersize=3, label=label)
 
 
-ROWS = {"normal_cycles": normal_cycles, "sliding_cycles": sliding_cycles, "new_contacts": new_contacts}
+ROWS = {"normal_cycles": normal_cycles, "sliding_cycles": sliding_cycles, "new_contacts": new_contacts, "dashpot": dashpot}
 
 
 def verify(c, names):
+    sys.path.insert(0, str(c.program.parent))  # compact_cell
     figure, panels = plt.subplots(1, len(names), figsize=(4.3 * len(names), 3.8), squeeze=False)
     rows = []
     for name, axes in zip(names, panels[0]):

@@ -14,8 +14,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tools"))
-import campaign
-from boundary_problems import Row, bits_of_restart, cost, existing, how_it_ended, killed_and_restarted, restart_line, strength
+import boundary_problems
+from boundary_problems import Row, cost, existing, how_it_ended, strength
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -30,8 +30,9 @@ PAPER = {
     "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=0)  # memory: README.md,
 }
 UNIQUENESS = {
-    f"start_{n}": Row("870.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),
-                      f"870, random start {n} of the step past sigma_int = 2.8 sigma_0") for n in (1, 2, 3, 4, 5)
+    f"start_{mesh}_{n}": Row(f"{mesh}.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),
+                             f"{mesh}, random start {n} of the step past sigma_int = 2.8 sigma_0", checkpoint_every=0)
+    for mesh in (870, 1280) for n in (1, 2, 3, 4, 5)
 }
 CELL = {
     "ve": Row("../biaxial/ve.toml", ("ve.compaction_friction=0.0",), "the volume element alone: dilatancy", path=True),
@@ -42,10 +43,6 @@ SMALL = {
     "small_first_gradient": Row("small_first_gradient.toml", text="12 x 12 Q8, 100 spheres"),
 }
 RUNS = PAPER | UNIQUENESS | SMALL
-ROWS = {name: row.text for name, row in (RUNS | CELL).items()} | {
-    "restart": "small.toml killed in the middle and gone on: the same bits",
-    "report": "table and figures of the rows that have results",
-}
 TITLES = {"952": "952 elements, Q8", "870": "870 elements, second gradient", "1280": "1280 elements, second gradient"}
 WALL = 1.0  # m, radius a
 UNIFORM = np.pi / (2 * np.sqrt(2))  # radial displacement over the length of the quarter's mean displacement, where it is uniform
@@ -156,13 +153,8 @@ def draw_maps(runs, names, file, reach=3.5):
 
 def report(c):
     runs = existing(c, RUNS)
-    restart = bits_of_restart(c, "restart")
-    said = restart_line(restart, "small.toml, killed after step 12, gone on from step 10") if restart else ""
-    if restart and not runs:
-        print(said)
-        return 1 if restart[1] else 0
     if not runs:
-        raise campaign.CampaignError(f"{c.runs}: no row has results; run one first")
+        return []
     c.processor_seconds = sum(run.processor_seconds for run in runs.values())
     with_fields = {name: run for name, run in runs.items() if output_steps(run.folder)}
     shown = [name for name in PAPER if name in with_fields] or list(with_fields)
@@ -179,27 +171,9 @@ def report(c):
         phi, cohesion, psi = strength(*cell.values())
         lines += ["", f"The volume element alone: phi = {phi:.1f}, psi = {psi:.1f} degrees, c = {cohesion:.2f} sigma_0; bands between 45 - phi / 2 and "
                   f"45 - psi / 2 to the radius: {45 - phi / 2:.1f} to {45 - psi / 2:.1f} degrees."]
-    if restart:
-        lines += ["", said]
-    c.table(lines)
-    print(*lines, sep="\n")
-    return 1 if restart and restart[1] else 0
-
-
-def work(c, names):
-    for name in names:
-        if name == "restart":
-            killed_and_restarted(c, "small.toml", "restart", ["control.end_time=0.8"], kill_after=12, checkpoint_every=5)
-        elif name != "report":
-            run = (RUNS | CELL)[name].run(c, name)
-            print(f"{name}: {run.last_words()}", flush=True)
-    return report(c)
-
-
-def main():
-    arguments = campaign.parser(HERE, __doc__, rows=True).parse_args()
-    return campaign.main(HERE, arguments, ROWS, lambda c: work(c, arguments.rows or [*CELL, *PAPER, "restart"]), on_meshes=True)
+    return lines
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    restart = "small.toml", "control.end_time=0.8"
+    sys.exit(boundary_problems.main(HERE, __doc__, RUNS | CELL, [*CELL, *PAPER], restart, report))

@@ -3,13 +3,14 @@
 
     validation/quasi_static/run.py [ROW ...] [--strain E] [--list] [--record] [--runs FOLDER] [--as-they-are]
 
-The biaxial of validation/solver (second gradient, D = 4e3 N) on 4 x 8 elements, increments of 1e-3 of axial strain,
-tolerance 5e-3. A row: spheres, inertial number, answer (end; mean; late: the mean that belongs to 2/3 of the step) and
-damping.
+The biaxial of validation/solver (second gradient) on 4 x 8 elements, increments of 1e-3 of axial strain, tolerance 5e-3. The
+name of a row: spheres, inertial number, answer (end; mean; late: the mean that belongs to 2/3 of the step), then what is not
+as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment).
 """
 
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tools"))
@@ -20,24 +21,43 @@ import numpy as np
 
 CASE = HERE.parent / "solver" / "biaxial_ve.toml"
 HEIGHT, SIGMA_0, VELOCITY = 2.0, 1e5, 0.1
-NUMBERS = (2e-2, 5e-3, 2e-3, 1e-3)
+NUMBERS = (2e-2, 5e-3, 2e-3, 1e-3, 5e-4)
 ANSWERS = {"end": (), "mean": ('ve.answer="mean"',), "late": ('ve.answer="mean"', "ve.mean_at=0.66666")}
-KEYS = [(spheres, number, answer, damping) for spheres in (200, 1000) for number in NUMBERS for answer in ANSWERS
-        for damping in (0.2, 0.7)]
+INCREMENTS = {"": 0.02, "half": 0.01, "quarter": 0.005}  # s: 1e-3 of axial strain, ...
 
 
-def name_of(key):
-    spheres, number, answer, damping = key
-    return f"{spheres}_{number:g}_{answer}" + ("" if damping == 0.2 else f"_{damping:g}")
+class Key(NamedTuple):
+    spheres: int
+    number: float
+    answer: str
+    damping: float = 0.2
+    mesh: str = "4x8"
+    seed: int = 1
+    increment: str = ""
+
+    def name(self):
+        unusual = [f"{self.damping:g}" * (self.damping != 0.2), self.mesh * (self.mesh != "4x8"),
+                   f"seed{self.seed}" * (self.seed != 1), self.increment]
+        return "_".join([str(self.spheres), f"{self.number:g}", self.answer, *filter(None, unusual)])
 
 
-ROWS = {name_of(key): key for key in KEYS}
+KEYS = [
+    *(Key(spheres, number, answer, damping) for spheres in (200, 400, 1000) for number in NUMBERS for answer in ANSWERS
+      for damping in (0.2, 0.7)),
+    *(Key(1000, number, answer, mesh="8x16", seed=seed) for number in NUMBERS for answer in ("end", "mean") for seed in (1, 2, 3)),
+    *(Key(1000, number, "mean", seed=seed) for number in NUMBERS for seed in (2, 3)),
+    *(Key(1000, number, answer, increment=part) for number in NUMBERS for answer in ("end", "mean") for part in ("half", "quarter")),
+]
+ROWS = {key.name(): key for key in KEYS}
 
 
 def settings(key, strain):
-    spheres, number, answer, damping = key
-    mesh = ["mesh.nx=4", "mesh.ny=8", "element.D=4e3", f"control.end_time={strain * HEIGHT / VELOCITY}"]
-    return [*mesh, f"ve.spheres={spheres}", f"ve.inertial_number={number}", f"ve.damping={damping}", *ANSWERS[answer]]
+    """Of the case file; D keeps the band at three elements or more of either mesh."""
+    nx, ny = key.mesh.split("x")
+    step = INCREMENTS[key.increment]
+    mesh = [f"mesh.nx={nx}", f"mesh.ny={ny}", *(["element.D=4e3"] if nx == "4" else []), f"control.end_time={strain * HEIGHT / VELOCITY}"]
+    return [*mesh, f"control.step={step}", f"control.max_step={step}", f"ve.spheres={key.spheres}", f"ve.seed={key.seed}",
+            f"ve.inertial_number={key.number}", f"ve.damping={key.damping}", *ANSWERS[key.answer]]
 
 
 def curve(history):
@@ -69,9 +89,9 @@ def table(lines):
 def draw(curves, file):
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8), sharey=True)
     for axis, spheres in zip(axes, (200, 1000)):
-        for (key, history) in (c for c in curves if c[0][0] == spheres):
+        for (key, history) in (c for c in curves if c[0].spheres == spheres):
             strain, force = curve(history)
-            axis.plot(100 * strain, force, label=name_of(key), linewidth=0.9, linestyle="--" if key[2] == "end" else "-")
+            axis.plot(100 * strain, force, label=key.name(), linewidth=0.9, linestyle="--" if key.answer == "end" else "-")
         axis.set(xlabel="axial strain [%]", title=f"{spheres} spheres")
         axis.legend(fontsize=6)
     axes[0].set(ylabel="force / (sigma_0 W)")

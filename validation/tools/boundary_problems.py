@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import campaign
 from campaign import ENVIRONMENT, CampaignError
 
 CLOCKS = ("dem_seconds", "wall_s")  # columns that hold times of the machine
@@ -31,6 +32,42 @@ class Row:
         if self.path:
             return c.path(self.case, name, *self.settings, c.cache)
         return c.run(self.case, name, *self.settings, c.cache, checkpoint_every=self.checkpoint_every)
+
+
+REPORTS = {
+    "restart": "small.toml killed in the middle and gone on: the same bits",
+    "report": "table and figures of the rows that have results",
+}
+
+
+def main(home, description, runs, default, restart, report):
+    """A campaign of boundary value problems. `runs`: name -> Row; `default`: names that are run when none is given.
+    restart: what is said of small.toml in the row of that name, and the setting of its end. report(c) draws the figures of the
+    rows that have results and returns the lines of the table, none where there are none."""
+    rows = {name: row.text for name, row in runs.items()} | REPORTS
+    arguments = campaign.parser(home, description, rows=True).parse_args()
+
+    def work(c):
+        for name in arguments.rows or [*default, "restart"]:
+            if name == "restart":
+                killed_and_restarted(c, "small.toml", name, [restart[1]], kill_after=12, checkpoint_every=5)
+            elif name != "report":
+                print(f"{name}: {runs[name].run(c, name).last_words()}", flush=True)
+        return _report(c, restart[0], report)
+
+    return campaign.main(home, arguments, rows, work, on_meshes=True)
+
+
+def _report(c, what, report):
+    """Table, figures and what the restart has shown; 1 where that has other bits."""
+    lines, restart = report(c), bits_of_restart(c, "restart")
+    said = ["", restart_line(restart, f"{what}, killed after step 12, gone on from step 10")] if restart else []
+    if not lines and not said:
+        raise CampaignError(f"{c.runs}: no row has results; run one first")
+    if lines:
+        c.table(lines + said)
+    print(*lines, *said, sep="\n")
+    return 1 if restart and restart[1] else 0
 
 
 def existing(c, names):

@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 """The paper's volume element along the biaxial's path, several seeds: curves, peak, value at the end.
 
-    validation/ve_biaxial/run.py [--seeds 1 2 3] [--spheres N] [--list] [--record] [--runs FOLDER]
+    validation/ve_biaxial/run.py [--laws] [--seeds 1 2 3] [--spheres N] [--list] [--record] [--runs FOLDER]
+
+--laws: the same under the paper's law to the letter, and with each of the switches that make it the authors' engine's.
 """
 
 import sys
@@ -31,10 +33,10 @@ def row(folder, seed):
 
 def draw(folders, file):
     figure, (stress, volume) = plt.subplots(1, 2, figsize=(8, 3.2))
-    for seed, folder in folders.items():
+    for label, folder in folders.items():
         curve, h = path_curve(folder), read_history(folder)
         volumetric = h["strain_xx"] + h["strain_yy"] + h["strain_zz"]
-        stress.plot(100 * curve.strain, curve.stress, linewidth=1, label=f"seed {seed}")
+        stress.plot(100 * curve.strain, curve.stress, linewidth=1, label=label)
         volume.plot(100 * curve.strain, 100 * volumetric, linewidth=1)
     stress.set_ylabel(r"axial stress / $\sigma_0$")
     volume.set_ylabel("volumetric strain [%] (dilation positive)")
@@ -45,6 +47,55 @@ def draw(folders, file):
     figure.tight_layout()
     figure.savefig(file, dpi=100)
     plt.close(figure)
+
+
+LAWS = {  # by name: what stands in the table, settings
+    "adhesive": ("YADE's adhesive law", {}),
+    "paper": ("the paper's law", {"contact_law": "paper"}),
+    "everywhere": ("+ adhesion on every contact", {"contact_law": "paper", "new_contacts": "adhesive"}),
+    "dashpots": ("+ dashpots for local damping", {"contact_law": "paper", "viscous_damping": 0.2, "damping": 0.0}),
+    "at_rest": ("+ trials start at rest", {"contact_law": "paper", "start_at_rest": "true"}),
+    "hold": ("+ hold of 50 steps", {"contact_law": "paper", "hold_steps": 50}),
+}
+LAWS["all"] = ("+ all four", {key: value for _, settings in LAWS.values() for key, value in settings.items()})
+LAWS_HEADER = [
+    "| law | peak / sigma_0 | at [%] | at 5 % | at the end (mean of 10) | volume change at 5 % [%] | at the end "
+    "| evaluations a step | DEM steps | ended early |",
+    "|---|---|---|---|---|---|---|---|---|---|",
+]
+
+
+def mean_and_scatter(values, form):
+    """Mean over the seeds, +- half of the range."""
+    return f"{np.mean(values):{form}} +- {np.ptp(values) / 2:{form}}" if len(values) > 1 else f"{values[0]:{form}}"
+
+
+def numbers(folder):
+    """What a row of LAWS_HEADER is made of, for one seed."""
+    curve, h = path_curve(folder), read_history(folder)
+    peak = int(np.argmax(curve.stress))
+    volume = 100 * (h["strain_xx"] + h["strain_yy"] + h["strain_zz"])
+    at_5 = float(np.interp(0.05, curve.strain, curve.stress)), float(np.interp(0.05, curve.strain, volume))
+    return (curve.stress[peak], 100 * curve.strain[peak], at_5[0], curve.stress[-10:].mean(), at_5[1], volume[-1],
+            h["evaluations"][1:].mean(), h["dem_steps"].sum())
+
+
+def compare_laws(c, a):
+    rows, shown = [], {}
+    for name, (title, settings) in LAWS.items():
+        found, reasons = [], []
+        for seed in a.seeds:
+            settings_of_seed = {"ve.seed": seed, "ve.spheres": a.spheres} | {f"ve.{key}": value for key, value in settings.items()}
+            folder, reason = biaxial(c, f"{name}_{seed}", settings_of_seed)
+            found.append(numbers(folder))
+            reasons += [f"seed {seed}: {reason}"] if reason else []
+            shown.setdefault(title, folder)
+        forms = (".2f", ".1f", ".2f", ".2f", ".2f", ".2f", ".2f", ".0f")
+        cells = [title, *(mean_and_scatter(values, form) for values, form in zip(zip(*found), forms)), "; ".join(reasons)]
+        rows.append("| " + " | ".join(cells) + " |")
+        print(rows[-1], flush=True)
+        c.table(LAWS_HEADER + rows, mark="laws")
+        draw(shown, c.product("laws.png"))
 
 
 HEADER = [
@@ -60,15 +111,17 @@ def follow(c, a):
         rows.append(row(folders[seed], seed))
         print(rows[-1], flush=True)
         c.table(HEADER + rows)
-        draw(folders, c.product("ve_biaxial.png"))
+        draw({f"seed {seed}": folder for seed, folder in folders.items()}, c.product("ve_biaxial.png"))
 
 
 def main():
     parser = campaign.parser(HERE, __doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--spheres", type=int, default=1000)
+    parser.add_argument("--laws", action="store_true", help="compare the contact laws and switches")
     a = parser.parse_args()
-    return campaign.main(HERE, a, {f"seed_{seed}": "" for seed in a.seeds}, lambda c: follow(c, a))
+    rows = {name: title for name, (title, _) in LAWS.items()} if a.laws else {f"seed_{seed}": "" for seed in a.seeds}
+    return campaign.main(HERE, a, rows, lambda c: compare_laws(c, a) if a.laws else follow(c, a))
 
 
 if __name__ == "__main__":
