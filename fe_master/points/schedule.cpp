@@ -87,10 +87,14 @@ std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner,
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
                            int ranks, double price) {
   const std::vector<int> then = reassign(older, owner, ranks, kBalanced);
-  double moved = 0;
-  for (std::size_t p = 0; p < owner.size(); ++p) moved += then[p] != owner[p];
+  std::vector<double> moves(static_cast<std::size_t>(ranks), 0.0);
+  for (std::size_t p = 0; p < owner.size(); ++p) {
+    if (then[p] == owner[p]) continue;
+    ++moves[static_cast<std::size_t>(owner[p])];
+    ++moves[static_cast<std::size_t>(then[p])];
+  }
   const double gain = busiest(loads(latest, owner, ranks)) - busiest(loads(latest, then, ranks));
-  if (gain <= price * moved) return owner;
+  if (gain <= price * busiest(moves)) return owner;
   std::vector<double> all(older.begin(), older.end());
   for (std::size_t p = 0; p < all.size(); ++p) all[p] += latest[p];
   return reassign(all, owner, ranks, kBalanced);

@@ -21,15 +21,16 @@ std::vector<int> assign(std::span<const double> costs, int ranks);
 std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner, int ranks, double tolerance);
 
 /// What pays: reassign() of older and latest costs together, to 2 % of the mean, where that of the older costs alone
-/// would have taken more off the busiest rank in the latest than all its moves cost at `price` each; else `owner`.
+/// would have taken more off the busiest rank in the latest than the moves cost that take longest: `price` for each
+/// point that a rank gives or takes, the ranks side by side; else `owner`.
 /// Costs that do not tell those to come move nothing: dealing in turn spreads a band over all ranks, and is hard to
 /// beat by costs that change by a quarter from step to step (validation/scaling).
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
                            int ranks, double price);
 
-/// DEM steps that it costs to move a VE, at most: it is saved, sent twice and restored (0.2 s of 1000 spheres in YADE,
-/// where a step takes 1.4 ms; 1 ms as compact cell, 0.07 ms).
-inline constexpr double kMoveSteps = 200;
+/// DEM steps that it costs a rank to give a VE or to take one, at most: 0.2 s to save and to restore 1000 spheres in
+/// YADE, where a step takes 1.4 ms; 1 ms as compact cell, 0.07 ms.
+inline constexpr double kMoveSteps = 70;
 
 /// Cost of all points of each rank.
 std::vector<double> loads(std::span<const double> costs, std::span<const int> owner, int ranks);

@@ -28,6 +28,8 @@ struct RunOptions {
   std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
   std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
   std::optional<bool> progress;      ///< see Log
+  /// After a checkpoint: shares the points out anew; returns what the log says of it, mostly nothing.
+  std::function<std::string()> at_checkpoint = [] { return std::string(); };
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 

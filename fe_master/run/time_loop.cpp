@@ -222,6 +222,7 @@ void TimeLoop::write_state() {
   write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
   last_checkpoint_ = files_.summary.steps;
   files_.log.note(fmt::format("checkpoint after step {}", files_.summary.steps));
+  if (const std::string done = options_.at_checkpoint(); !done.empty()) files_.log.note(done);
 }
 
 void TimeLoop::restart() {

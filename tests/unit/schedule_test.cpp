@@ -108,6 +108,12 @@ TEST(Schedule, PointsMoveOnlyWhereThatPays) {
   EXPECT_EQ(moved(rebalance(costs, costs, owner, 2, 9), owner), 1u);
 }
 
+TEST(Schedule, RanksMovePointsSideBySide) {
+  const std::vector<double> costs(8, 10.0);
+  const std::vector<int> owner = {0, 0, 0, 1, 1, 1, 2, 3};  // two moves, each of another pair of ranks, take 10 off
+  EXPECT_EQ(moved(rebalance(costs, costs, owner, 4, 9), owner), 2u);
+}
+
 TEST(Schedule, CostsThatDoNotTellThoseToComeMoveNothing) {
   const std::vector<double> older = {10, 10, 10, 10}, latest = {1, 1, 1, 27};
   const std::vector<int> owner = {0, 0, 0, 1};  // by the older costs a point would go to rank 1
