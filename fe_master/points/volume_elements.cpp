@@ -409,10 +409,13 @@ Balance VolumeElements::balance(bool may_move) {
 }
 
 std::string describe(const Balance& balance, std::size_t points) {
-  return fmt::format(
+  const std::string found = fmt::format(
       "balance of the ranks since the last checkpoint: {:.3f} of ideal by counted cost, {:.3f} by the clock; {} of {} "
-      "points move, the busiest rank has {:.3f} instead of {:.3f} of the mean",
-      balance.counted, balance.clocked, balance.moved, points, balance.after, balance.before);
+      "points move",
+      balance.counted, balance.clocked, balance.moved, points);
+  if (balance.moved == 0) return found;
+  return found +
+         fmt::format(", the busiest rank has {:.3f} instead of {:.3f} of the mean", balance.after, balance.before);
 }
 
 /// Takes these points from their ranks to those of `owner`.
