@@ -122,11 +122,22 @@ CompactBlock::CompactBlock(const CompactHeader& header) {
 }
 
 CompactBlock::CompactBlock(std::string_view saved) {
-  const std::string fault = why_invalid(saved);
-  if (!fault.empty()) throw UserError(fault);
+  const auto refuse = [](const std::string& why) { throw UserError("state of a volume element: " + why); };
+  CompactHeader header;
+  if (saved.size() < sizeof header || saved.size() % kLine != 0) refuse("it is truncated; save it again");
+  std::memcpy(&header, saved.data(), sizeof header);
+  if (header.magic != CompactHeader::kMagic) refuse("it is not one of the compact engine's");
+  if (header.version != CompactHeader::kVersion)
+    refuse(fmt::format("its version is {}, this program reads version {}; go on with the program that wrote it",
+                       header.version, CompactHeader::kVersion));
+  if (header.bytes != saved.size() || size_of(header) != saved.size())
+    refuse(fmt::format("it has {} bytes instead of {}; it is truncated or changed, save it again", saved.size(),
+                       header.bytes));
+  if (checksum(saved) != header.checksum) refuse("its checksum is wrong; it has been changed, save it again");
   lines_.resize(saved.size() / kLine);
   std::memcpy(static_cast<void*>(lines_.data()), saved.data(), saved.size());
   bind();
+  if (!consistent(arrays_)) refuse("it contradicts itself; save it again");
 }
 
 void CompactBlock::bind() {
@@ -175,26 +186,6 @@ std::string CompactBlock::save() const {
   const std::uint64_t sum = checksum(bytes);
   std::memcpy(bytes.data() + offsetof(CompactHeader, checksum), &sum, sizeof sum);
   return bytes;
-}
-
-std::string CompactBlock::why_invalid(std::string_view saved) {
-  CompactHeader header;
-  const std::string what = "state of a volume element";
-  if (saved.size() < sizeof header || saved.size() % kLine != 0) return what + ": it is truncated; save it again";
-  std::memcpy(&header, saved.data(), sizeof header);
-  if (header.magic != CompactHeader::kMagic) return what + ": it is not one of the compact engine's";
-  if (header.version != CompactHeader::kVersion)
-    return fmt::format("{}: its version is {}, this program reads version {}; go on with the program that wrote it",
-                       what, header.version, CompactHeader::kVersion);
-  if (header.bytes != saved.size() || size_of(header) != saved.size())
-    return fmt::format("{}: it has {} bytes instead of {}; it is truncated or changed, save it again", what,
-                       saved.size(), header.bytes);
-  if (checksum(saved) != header.checksum) return what + ": its checksum is wrong; it has been changed, save it again";
-  std::vector<Line> copy(saved.size() / kLine);
-  std::memcpy(static_cast<void*>(copy.data()), saved.data(), saved.size());
-  CompactArrays arrays;
-  lay_out(reinterpret_cast<std::byte*>(copy.data()), header, arrays);
-  return consistent(arrays) ? "" : what + ": it contradicts itself; save it again";
 }
 
 }  // namespace femxdem

@@ -124,7 +124,7 @@ class CompactBlock {
  public:
   /// Room for header.spheres, contact_capacity, pair_capacity, classes, start_vectors; zeros but for the header.
   explicit CompactBlock(const CompactHeader& header);
-  /// From saved bytes. Throws UserError with why_invalid's sentence.
+  /// From saved bytes. Throws UserError where they are truncated, changed or of another version.
   explicit CompactBlock(std::string_view saved);
   CompactBlock(const CompactBlock& other) : CompactBlock() { assign(other); }
   CompactBlock& operator=(const CompactBlock&) = delete;
@@ -133,7 +133,6 @@ class CompactBlock {
   /// More room for contacts and pairs.
   void grow(std::size_t contacts, std::size_t pairs);
   std::string save() const;
-  static std::string why_invalid(std::string_view saved);  ///< "" if it is valid
 
   CompactHeader& header() const { return *arrays_.header; }
   const CompactArrays& arrays() const { return arrays_; }

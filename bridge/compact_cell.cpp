@@ -85,15 +85,9 @@ CompactCell CompactCell::load(std::string_view saved) {
 
 std::string CompactCell::save() const { return block_->save(); }
 
-std::optional<std::string> CompactCell::why_invalid(std::string_view saved) {
-  std::string fault = CompactBlock::why_invalid(saved);
-  return fault.empty() ? std::nullopt : std::optional(std::move(fault));
-}
-
 std::string CompactCell::to_scene() const { return scene_of_block(*block_); }
 std::size_t CompactCell::memory() const { return block_->memory(); }
 std::size_t CompactCell::size() const { return block_->header().spheres; }
-std::size_t CompactCell::contacts() const { return block_->header().contacts; }
 
 CompactCell::Deformed CompactCell::deform(const Row3& L, long steps, Sampling sampling) {
   const auto started = std::chrono::steady_clock::now();
@@ -132,15 +126,20 @@ bool CompactCell::flip() { return femxdem::flip(*block_); }
 
 Row3 CompactCell::stress() const { return symmetrised(love_weber(block_->arrays())); }
 Row3 CompactCell::stretch() const { return block_->header().trsf; }
-double CompactCell::unbalanced_force() const { return femxdem::unbalanced_force(block_->arrays()); }
 PointReport CompactCell::trial_report() const { return femxdem::trial_report(block_->arrays(), trial_); }
-PointReport CompactCell::report() const { return femxdem::report(block_->arrays(), trial_); }
+void CompactCell::complete(PointReport& report) const { complete_report(block_->arrays(), trial_, report); }
+double CompactCell::time_step() const { return block_->header().time_step; }
+
+PointReport CompactCell::report() const {
+  PointReport whole = trial_report();
+  complete(whole);
+  return whole;
+}
 
 VeInfo CompactCell::info() const {
   const CompactHeader& h = block_->header();
   const double pressure = femxdem::pressure(love_weber(block_->arrays()));
-  return {h.time_step, time_scale(h, pressure), determinant(h.H), static_cast<double>(h.spheres), h.mean_diameter,
-          pressure};
+  return {h.time_step, time_scale(h, pressure), pressure};
 }
 
 std::array<double, 81> CompactCell::stiffness(bool relaxed) const {

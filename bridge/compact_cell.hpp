@@ -48,8 +48,6 @@ class CompactCell {
   static CompactCell load(std::string_view saved);
   /// The block with its checksum: load(save()) continues with equal bits, and save() of it gives equal bytes.
   std::string save() const;
-  /// The sentence why `saved` is not a state that load() takes, or nothing.
-  static std::optional<std::string> why_invalid(std::string_view saved);
 
   CompactCell(const CompactCell& other);
   CompactCell& operator=(const CompactCell& other);  ///< no allocation where the memory there suffices
@@ -93,13 +91,13 @@ class CompactCell {
   /// All of kReportFields; "seconds" and "engine_seconds" are those of the last deform. Contacts that slide or adhere
   /// are of now.
   PointReport report() const;
-  /// The unbalanced force and the number of contacts alone, which decide whether an answer is good.
-  double unbalanced_force() const;
-  std::size_t contacts() const;
+  /// The rest of a report that trial_report has begun, of the same state; its costs are those of the last deform.
+  void complete(PointReport& report) const;
   /// Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised, (3, 3, 3, 3) [Pa]; relaxed: the same
   /// network with its grains in equilibrium.
   std::array<double, 81> stiffness(bool relaxed) const;
   VeInfo info() const;
+  double time_step() const;  ///< [s]
   /// The time step becomes what the contact network of now asks for, between load steps: within 1e-12 of what
   /// yade_scripts/time_step.py finds, which sums in another order. With ve.sorted_contacts YADE's cells take it from
   /// here.

@@ -34,8 +34,7 @@ py::dict report(const CompactCell& cell) {
 py::dict info(const CompactCell& cell) {
   const femxdem::VeInfo i = cell.info();
   return py::dict(py::arg("time_step") = i.time_step, py::arg("time_scale") = i.time_scale,
-                  py::arg("volume") = i.volume, py::arg("spheres") = i.spheres,
-                  py::arg("mean_diameter") = i.mean_diameter, py::arg("mean_stress") = i.mean_stress);
+                  py::arg("mean_stress") = i.mean_stress);
 }
 
 /// Raises RuntimeError with the sentence of a failure.
@@ -62,7 +61,6 @@ PYBIND11_MODULE(compact_cell, module) {
   module.def("kernels", &femxdem::kernels, "The kernels that this processor has, slowest first.");
   module.def("use_kernel", &femxdem::use_kernel);
   module.def("kernel_in_use", &femxdem::kernel_in_use);
-  module.def("why_invalid", [](const py::bytes& saved) { return CompactCell::why_invalid(std::string(saved)); });
   py::class_<CompactCell>(module, "CompactCell", "See bridge/compact_cell.hpp.")
       .def_static("from_scene",
                   [](const py::bytes& exported) { return CompactCell::from_scene(std::string(exported)); })
@@ -90,11 +88,9 @@ PYBIND11_MODULE(compact_cell, module) {
              if (const auto failure = c.hold(steps)) throw std::runtime_error(*failure);
            })
       .def("flip", &CompactCell::flip)
-      .def("unbalanced_force", &CompactCell::unbalanced_force)
       .def("follow_network", &CompactCell::follow_network)
       .def("report", &report)
       .def("info", &info)
-      .def_property_readonly("contacts", &CompactCell::contacts)
       .def_property_readonly("memory", &CompactCell::memory)
       .def("__len__", &CompactCell::size);
 }

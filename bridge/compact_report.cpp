@@ -38,6 +38,15 @@ Vector force(const CompactArrays& a, std::size_t c) {
   return f;
 }
 
+/// Mean resultant on a sphere over mean contact force.
+double unbalanced_force(const CompactArrays& a) {
+  const CompactHeader& h = *a.header;
+  double resultants = 0, forces = 0;
+  for (std::size_t s = 0; s < h.spheres; ++s) resultants += norm(a.spheres[s].f);
+  for (std::size_t c = 0; c < h.contacts; ++c) forces += norm(force(a, c));
+  return resultants / h.spheres / (forces / std::max(h.contacts, 1U));
+}
+
 /// Whether the shear force is at the limit of its law, within 1e-6 of it (contact_loop.at_coulomb_limit).
 bool slides(const CompactArrays& a, std::size_t c) {
   const CompactClass& kind = a.classes[a.class_of[c]];
@@ -134,14 +143,6 @@ double time_scale(const CompactHeader& h, double pressure) {
   return pressure > 0 ? h.mean_diameter * std::sqrt(h.density / pressure) : std::numeric_limits<double>::infinity();
 }
 
-double unbalanced_force(const CompactArrays& a) {
-  const CompactHeader& h = *a.header;
-  double resultants = 0, forces = 0;
-  for (std::size_t s = 0; s < h.spheres; ++s) resultants += norm(a.spheres[s].f);
-  for (std::size_t c = 0; c < h.contacts; ++c) forces += norm(force(a, c));
-  return resultants / h.spheres / (forces / std::max(h.contacts, 1U));
-}
-
 PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   const CompactHeader& h = *a.header;
   PointReport r;
@@ -165,11 +166,11 @@ PointReport trial_report(const CompactArrays& a, const CompactTrial& trial) {
   return r;
 }
 
-PointReport report(const CompactArrays& a, const CompactTrial& trial) {
-  PointReport r = trial_report(a, trial);
+void complete_report(const CompactArrays& a, const CompactTrial& trial, PointReport& r) {
+  r["dem_steps"] = trial.steps;
+  r["seconds"] = r["engine_seconds"] = trial.seconds;
   report_network(a, r);
   r["mean_rotation"] = mean_rotation(a);
-  return r;
 }
 
 std::vector<Spring> springs(const CompactArrays& a) {

@@ -17,12 +17,10 @@ Row3 symmetrised(const Row3& stress);
 double pressure(const Row3& stress);
 /// a sqrt(rho/p) [s]; without pressure no rate is slow: infinite.
 double time_scale(const CompactHeader& header, double pressure);
-/// Mean resultant on a sphere over mean contact force.
-double unbalanced_force(const CompactArrays& arrays);
 /// What judges and counts a trial; NaN in the rest.
 PointReport trial_report(const CompactArrays& arrays, const CompactTrial& trial);
-/// All of it.
-PointReport report(const CompactArrays& arrays, const CompactTrial& trial);
+/// The rest of it, and what the trial has cost.
+void complete_report(const CompactArrays& arrays, const CompactTrial& trial, PointReport& report);
 /// The contacts as springs.
 std::vector<Spring> springs(const CompactArrays& arrays);
 

@@ -9,44 +9,24 @@
 
 #include "compact_step.hpp"
 #include "errors.hpp"
+#include "packet.hpp"
 
 namespace femxdem {
 namespace {
 
 constexpr std::string_view kMagic = "fxdscene";
 constexpr std::int64_t kVersion = 2;
+constexpr std::size_t kHeadWords = 53;  // before the spheres
 
-/// Numbers one after the other; the same sequence of calls reads a scene and writes it.
-class Reader {
- public:
-  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
-  template <class T, class Target>
-  void number(Target& target) {
-    if (at_ + sizeof(T) > bytes_.size()) throw UserError("export of a YADE scene: it is truncated; export it again");
-    T value;
-    std::memcpy(&value, bytes_.data() + at_, sizeof value);
-    at_ += sizeof value;
-    target = static_cast<Target>(value);
-  }
-  std::size_t left() const { return bytes_.size() - at_; }
-
- private:
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-class Writer {
- public:
-  template <class T, class Source>
-  void number(const Source& source) {
-    const T value = static_cast<T>(source);
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  std::string& bytes() { return bytes_; }
-
- private:
-  std::string bytes_{kMagic};
-};
+/// A number that is T in the export and anything here; the same sequence of calls reads a scene and writes it.
+template <class T, class Number>
+void number(PacketReader& reader, Number& target) {
+  target = static_cast<Number>(reader.get<T>());
+}
+template <class T, class Number>
+void number(PacketWriter& writer, const Number& source) {
+  writer.put(static_cast<T>(source));
+}
 
 /// A contact as the export has it.
 struct SceneContact {
@@ -62,12 +42,12 @@ struct SceneContact {
 /// The numbers of the header that the export has, in its order.
 template <class Stream, class Header>
 void header_numbers(Stream& s, Header& h) {
-  for (auto* number : {&h.time_step, &h.damping}) s.template number<double>(*number);
+  for (auto* scalar : {&h.time_step, &h.damping}) number<double>(s, *scalar);
   for (auto* tensor : {&h.H, &h.trsf, &h.L, &h.previous_L})
-    for (auto& number : *tensor) s.template number<double>(number);
-  for (auto* number : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
+    for (auto& entry : *tensor) number<double>(s, entry);
+  for (auto* scalar : {&h.new_adhesion, &h.new_friction, &h.constant_kn, &h.constant_ks, &h.safety, &h.density,
                        &h.mean_diameter, &h.solid_volume, &h.viscous_damping})
-    s.template number<double>(*number);
+    number<double>(s, *scalar);
 }
 
 template <class Stream>
@@ -75,23 +55,23 @@ void sphere_numbers(Stream& s, const CompactArrays& a) {
   const std::size_t n = a.header->spheres;
   for (auto member : {&CompactSphere::x, &CompactSphere::v, &CompactSphere::w, &CompactSphere::f, &CompactSphere::t})
     for (std::size_t k = 0; k < n; ++k)
-      for (double& number : a.spheres[k].*member) s.template number<double>(number);
+      for (double& entry : a.spheres[k].*member) number<double>(s, entry);
   for (std::size_t k = 0; k < n; ++k)
-    for (double* part : a.turned) s.template number<double>(part[k]);
-  for (std::size_t k = 0; k < n; ++k) s.template number<double>(a.spheres[k].radius);
+    for (double* part : a.turned) number<double>(s, part[k]);
+  for (std::size_t k = 0; k < n; ++k) number<double>(s, a.spheres[k].radius);
   for (double* array : {a.mass, a.inertia, a.young, a.poisson, a.tangent})
-    for (std::size_t k = 0; k < n; ++k) s.template number<double>(array[k]);
+    for (std::size_t k = 0; k < n; ++k) number<double>(s, array[k]);
 }
 
 template <class Stream>
 void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
   for (auto& c : contacts)
-    for (auto& id : c.ids) s.template number<std::int64_t>(id);
+    for (auto& id : c.ids) number<std::int64_t>(s, id);
   for (auto& c : contacts)
-    for (auto& number : c.shift) s.template number<std::int64_t>(number);
-  for (auto& c : contacts) s.template number<std::int64_t>(c.waits);
+    for (auto& entry : c.shift) number<std::int64_t>(s, entry);
+  for (auto& c : contacts) number<std::int64_t>(s, c.waits);
   const auto each = [&](auto get) {
-    for (auto& c : contacts) s.template number<double>(get(c));
+    for (auto& c : contacts) number<double>(s, get(c));
   };
   each([](SceneContact& c) -> double& { return c.kn; });
   each([](SceneContact& c) -> double& { return c.ks; });
@@ -105,7 +85,7 @@ void contact_numbers(Stream& s, std::vector<SceneContact>& contacts) {
   each([](SceneContact& c) -> double& { return c.normal_force; });
   for (auto member : {&SceneContact::shear, &SceneContact::normal})
     for (auto& c : contacts)
-      for (double& number : c.*member) s.template number<double>(number);
+      for (double& entry : c.*member) number<double>(s, entry);
 }
 
 /// The classes that the contacts and their future need, each once.
@@ -182,14 +162,15 @@ struct Head {
   std::int64_t spheres = 0, contacts = 0;
 };
 
-Head read_head(Reader& reader) {
+Head read_head(PacketReader& reader) {
   Head head;
   std::int64_t version = 0, law = 0;
-  reader.number<std::int64_t>(version);
+  if (reader.left() < kHeadWords * 8) throw UserError("export of a YADE scene: it is truncated; export it again");
+  number<std::int64_t>(reader, version);
   if (version != kVersion) throw UserError("export of a YADE scene: it is of another version; export it again");
-  reader.number<std::int64_t>(law);
-  reader.number<std::int64_t>(head.spheres), reader.number<std::int64_t>(head.contacts);
-  reader.number<std::int64_t>(head.header.iteration), reader.number<std::int64_t>(head.header.start_vectors);
+  number<std::int64_t>(reader, law);
+  number<std::int64_t>(reader, head.spheres), number<std::int64_t>(reader, head.contacts);
+  number<std::int64_t>(reader, head.header.iteration), number<std::int64_t>(reader, head.header.start_vectors);
   header_numbers(reader, head.header);
   const auto n = static_cast<std::size_t>(head.spheres), m = static_cast<std::size_t>(head.contacts);
   const bool sizes = head.spheres >= 2 && head.contacts >= 0 && n < 1U << 28 && m < 1U << 28;
@@ -205,7 +186,7 @@ Head read_head(Reader& reader) {
 
 CompactBlock block_of_scene(std::string_view exported) {
   if (exported.substr(0, kMagic.size()) != kMagic) throw UserError("this is not the export of a YADE scene");
-  Reader reader(exported.substr(kMagic.size()));
+  PacketReader reader(exported.substr(kMagic.size()));
   Head head = read_head(reader);
   CompactBlock spheres(head.header);  // until the classes are known
   sphere_numbers(reader, spheres.arrays());
@@ -240,7 +221,7 @@ CompactBlock block_of_scene(std::string_view exported) {
                                  {s.turned[3], a.turned[3]}})
     std::copy_n(from, h.spheres, to);
   if (h.start_vectors)
-    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) reader.number<double>(a.start[k]);
+    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) number<double>(reader, a.start[k]);
   fill_contacts(a, contacts, class_of);
   make_list(block);
   if (h.law == CompactLaw::paper) find_forces(block);
@@ -249,7 +230,7 @@ CompactBlock block_of_scene(std::string_view exported) {
 
 bool same_state(std::string_view one, std::string_view other) {
   if (one.substr(0, kMagic.size()) != kMagic) throw UserError("this is not the export of a YADE scene");
-  Reader reader(one.substr(kMagic.size()));
+  PacketReader reader(one.substr(kMagic.size()));
   const Head head = read_head(reader);
   const auto n = static_cast<std::size_t>(head.spheres);
   const std::size_t turned = one.size() - reader.left() + 8 * 15 * n, end = turned + 8 * 4 * n;
@@ -268,11 +249,11 @@ bool same_state(std::string_view one, std::string_view other) {
 std::string scene_of_block(const CompactBlock& block) {
   const CompactArrays& a = block.arrays();
   const CompactHeader& h = *a.header;
-  Writer writer;
-  for (const std::int64_t number :
+  PacketWriter writer;
+  for (const std::int64_t count :
        {kVersion, static_cast<std::int64_t>(h.law), static_cast<std::int64_t>(h.spheres),
         static_cast<std::int64_t>(h.contacts), h.iteration, static_cast<std::int64_t>(h.start_vectors)})
-    writer.number<std::int64_t>(number);
+    number<std::int64_t>(writer, count);
   header_numbers(writer, h);
   sphere_numbers(writer, a);
   std::vector<SceneContact> contacts(h.contacts);
@@ -287,8 +268,8 @@ std::string scene_of_block(const CompactBlock& block) {
   }
   contact_numbers(writer, contacts);
   if (h.start_vectors)
-    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) writer.number<double>(a.start[k]);
-  return std::move(writer.bytes());
+    for (std::size_t k = 0; k < std::size_t{6} * h.spheres; ++k) number<double>(writer, a.start[k]);
+  return std::string(kMagic) + writer.take();
 }
 
 }  // namespace femxdem

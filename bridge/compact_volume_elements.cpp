@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <exception>
 #include <fstream>
 #include <map>
+#include <mutex>
 #include <numeric>
 #include <set>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -18,9 +21,15 @@
 namespace femxdem {
 namespace {
 
-using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
+/// The stress at the end of a trial, which its report holds [Pa].
+Tensor2 end_stress(const PointReport& report) {
+  Tensor2 s;
+  s(0, 0) = report["end_stress_xx"], s(1, 1) = report["end_stress_yy"], s(2, 2) = report["end_stress_zz"];
+  s(0, 1) = s(1, 0) = report["end_stress_xy"];
+  s(1, 2) = s(2, 1) = report["end_stress_yz"];
+  s(2, 0) = s(0, 2) = report["end_stress_zx"];
+  return s;
+}
 
 /// A number in [0, 1) that the trial's number and the point decide (splitmix64, Steele, Lea, Flood 2014).
 double drawn(std::uint64_t trial) {
@@ -66,15 +75,15 @@ CompactVolumeElements::Point CompactVolumeElements::point_of(const std::string& 
     if (!saved) require_time_scale(info.time_scale, info.time_step, info.mean_stress);
     point.strained.reference_time_scale = saved ? saved->reference_time_scale : info.time_scale;
   }
-  adopt(point);
+  adopt(point, tensor(point.cell->stress()));
   return point;
 }
 
-void CompactVolumeElements::adopt(Point& point) const {
+void CompactVolumeElements::adopt(Point& point, const Tensor2& stress) const {
   point.strained.stretch = tensor(point.cell->stretch());
-  point.strained.level = network_level(point.strained.stretch, tensor(point.cell->stress()));
+  point.strained.level = network_level(point.strained.stretch, stress);
   point.strained.frozen_steps = 0;
-  point.time_step = point.cell->info().time_step;
+  point.time_step = point.cell->time_step();
 }
 
 void CompactVolumeElements::add(const std::string& state, std::size_t count) {
@@ -179,17 +188,31 @@ CompactVolumeElements::Cell CompactVolumeElements::spare_cell() {
   return cell;
 }
 
-/// The work of `count` items by the threads of this rank; items are taken in order, as threads become free.
+/// The work of `count` items by the threads of this rank; items are taken in order, as threads become free. Where the
+/// system gives fewer threads, fewer work; what one of them throws is thrown once all have ended.
 template <class Work>
 void CompactVolumeElements::in_parallel(std::size_t count, Work work) const {
   std::atomic<std::size_t> next{0};
+  std::exception_ptr thrown;
+  std::mutex guard;
   const auto serve = [&] {
-    for (std::size_t item = next++; item < count; item = next++) work(item);
+    try {
+      for (std::size_t item = next++; item < count; item = next++) work(item);
+    } catch (...) {  // thrown again below
+      const std::lock_guard hold(guard);
+      thrown = std::current_exception();
+    }
   };
-  std::vector<std::jthread> helpers;
-  for (std::size_t t = 1; t < std::min<std::size_t>(static_cast<std::size_t>(compact_.threads), count); ++t)
-    helpers.emplace_back(serve);
-  serve();
+  {
+    std::vector<std::jthread> helpers;
+    try {
+      for (std::size_t t = 1; t < std::min<std::size_t>(static_cast<std::size_t>(compact_.threads), count); ++t)
+        helpers.emplace_back(serve);
+    } catch (const std::system_error&) {  // no more of them
+    }
+    serve();
+  }
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
@@ -218,7 +241,8 @@ void CompactVolumeElements::deform(Trial& trial) const {
   if (!trial.failure && steps > 0) trial.failure = cell.hold(options_.hold_steps);
   if (trial.failure) return;
   trial.report = cell.trial_report();
-  trial.found = {tensor(answers_mean(options_) ? end.mean_stress : cell.stress()), tensor(cell.stretch()), {}};
+  trial.found = {
+      answers_mean(options_) ? tensor(end.mean_stress) : end_stress(trial.report), tensor(cell.stretch()), {}};
 }
 
 void CompactVolumeElements::check(const Trial& trial) {
@@ -243,16 +267,19 @@ void CompactVolumeElements::check(const Trial& trial) {
 
 void CompactVolumeElements::commit() {
   if (size() == 0) return;
-  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
-  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  require_committable(trial_pending_, trial_failed_);
   std::vector<Point> ends(trials_.size());
   in_parallel(trials_.size(), [&](std::size_t t) {
     CompactCell& cell = *trials_[t].cell;
     Point& end = ends[t] = points_[trials_[t].first];
     end.cell = trials_[t].cell;
-    end.report = cell.report();
-    if (network_level(tensor(cell.stretch()), tensor(cell.stress())) != end.strained.level) cell.follow_network();
-    adopt(end);
+    end.report = trials_[t].report;
+    cell.complete(end.report);
+    const NetworkLevel before = end.strained.level;
+    adopt(end, end_stress(end.report));
+    if (end.strained.level == before) return;
+    cell.follow_network();
+    end.time_step = cell.time_step();
   });
   for (std::size_t p = 0; p < size(); ++p) {
     Point& end = ends[trial_of_point_[p]];
@@ -279,29 +306,21 @@ std::string CompactVolumeElements::save_one(std::size_t index) {
   return encode({EngineKind::compact, point.strained.reference_time_scale, point.strained.origin, point.cell->save()});
 }
 
-SavedStates CompactVolumeElements::save() {
-  SavedStates states;
-  std::map<const CompactCell*, std::string> known;
-  for (std::size_t p = 0; p < size(); ++p) {
-    std::string& state = known[points_[p].cell.get()];
-    if (state.empty()) state = save_one(p);
-    states.push_back(state);
-  }
-  return states;
+void CompactVolumeElements::save_each(const TakeState& take) {
+  StateSource cells;  // points of one cell have one state
+  std::map<const CompactCell*, int> number_of;
+  for (const Point& point : points_)
+    cells.number_of_point.push_back(
+        number_of.emplace(point.cell.get(), static_cast<int>(number_of.size())).first->second);
+  for (const auto& [cell, points] : cells.points_of_states()) take(save_one(points.front()), points);
 }
 
-void CompactVolumeElements::load(const SavedStates& states) {
-  if (states.size() != size())
-    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
-  std::map<std::string_view, Point> known;  // equal states are one cell
-  std::vector<Point> loaded;
-  for (std::size_t p = 0; p < size(); ++p) {
-    auto entry = known.find(states[p]);
-    if (entry == known.end()) entry = known.emplace(states[p], point_of(states[p])).first;
-    require_origin(entry->second.strained.origin, points_[p].strained.origin);
-    loaded.push_back(entry->second);
+void CompactVolumeElements::load_into(std::span<const std::size_t> points, const std::string& state) {
+  const Point loaded = point_of(state);
+  for (const std::size_t p : points) {
+    require_origin(loaded.strained.origin, points_.at(p).strained.origin);
+    points_[p] = loaded;
   }
-  points_ = std::move(loaded);
   trials_.clear();
   trial_pending_ = false;
 }

@@ -41,9 +41,9 @@ class CompactVolumeElements : public LocalPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
   std::vector<PointReport> reports() const override;
-  SavedStates save() override;
+  void save_each(const TakeState& take) override;
   std::string save_one(std::size_t index) override;
-  void load(const SavedStates& states) override;
+  void load_into(std::span<const std::size_t> points, const std::string& state) override;
   std::uint64_t peak_memory() const override { return peak_memory_; }
   EngineCheck engine_check() const override { return check_; }
   int threads() const override { return compact_.threads; }
@@ -70,7 +70,7 @@ class CompactVolumeElements : public LocalPoints {
   };
 
   Point point_of(const std::string& state);
-  void adopt(Point& point) const;
+  void adopt(Point& point, const Tensor2& stress) const;
   Cell spare_cell();
   std::vector<std::size_t> longest_first() const;
   void group(const std::vector<Straining>& plans);

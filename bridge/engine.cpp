@@ -83,17 +83,24 @@ int Engine::add(const std::string& state) {
   return in_python([&] { return py::cast<int>(engine_.attr("add")(py::bytes(state))); });
 }
 
-void Engine::replace(int ve, const std::string& state) {
-  in_python([&] { engine_.attr("replace")(ve, py::bytes(state)); });
-}
-
 std::string Engine::save(int ve) {
   return in_python([&] { return py::cast<std::string>(py::bytes(engine_.attr("save")(ve))); });
 }
 
-void Engine::remove(int ve) {
-  in_python([&] { engine_.attr("remove")(ve); });
+template <class... Arguments>
+void Engine::call(const char* method, Arguments&&... arguments) {
+  in_python([&] { engine_.attr(method)(std::forward<Arguments>(arguments)...); });
 }
+
+void Engine::replace(int ve, const std::string& state) { call("replace", ve, py::bytes(state)); }
+void Engine::remove(int ve) { call("remove", ve); }
+void Engine::write_back(int ve, const std::string& exported) { call("write_back", ve, py::bytes(exported)); }
+void Engine::follow_network(int ve) { call("follow_network", ve); }
+void Engine::complete_report(int ve, Slot& slot) { call("complete_report", ve, view(slot.report)); }
+void Engine::measure(int ve, Slot& slot) {
+  call("measure", ve, view(slot.stress), view(slot.report), view(slot.stretch));
+}
+void Engine::stiffness(int ve, Slot& slot, bool relaxed) { call("stiffness", ve, view(slot.stiffness), relaxed); }
 
 Engine::Export Engine::export_scene(const std::string& state) {
   return in_python([&] {
@@ -101,10 +108,6 @@ Engine::Export Engine::export_scene(const std::string& state) {
     const bool covered = py::isinstance<py::bytes>(answer);
     return Export{covered, py::cast<std::string>(answer)};
   });
-}
-
-void Engine::write_back(int ve, std::string_view exported) {
-  in_python([&] { engine_.attr("write_back")(ve, py::bytes(exported.data(), exported.size())); });
 }
 
 std::string Engine::referee(int ve, std::string_view exported, std::array<double, 9> L, long steps) {
@@ -118,8 +121,7 @@ VeInfo Engine::info(int ve) {
   return in_python([&] {
     const py::dict info = engine_.attr("info")(ve);
     const auto number = [&](const char* key) { return py::cast<double>(py::float_(info[key])); };
-    return VeInfo{number("time_step"), number("time_scale"),    number("volume"),
-                  number("spheres"),   number("mean_diameter"), number("mean_stress")};
+    return VeInfo{number("time_step"), number("time_scale"), number("mean_stress")};
   });
 }
 
@@ -132,22 +134,6 @@ void Engine::deform(int ve, Slot& slot) {
       deform(ve, L, py::int_(slot.steps), py::int_(slot.sample_every), slot.late, view(slot.mean_stress));
     }
   });
-}
-
-void Engine::measure(int ve, Slot& slot) {
-  in_python([&] { engine_.attr("measure")(ve, view(slot.stress), view(slot.report), view(slot.stretch)); });
-}
-
-void Engine::complete_report(int ve, Slot& slot) {
-  in_python([&] { engine_.attr("complete_report")(ve, view(slot.report)); });
-}
-
-void Engine::stiffness(int ve, Slot& slot, bool relaxed) {
-  in_python([&] { engine_.attr("stiffness")(ve, view(slot.stiffness), relaxed); });
-}
-
-void Engine::follow_network(int ve) {
-  in_python([&] { engine_.attr("follow_network")(ve); });
 }
 
 pid_t Engine::fork() {

@@ -34,7 +34,7 @@ class Engine {
     std::string bytes;  ///< or the sentence why not
   };
   Export export_scene(const std::string& state);
-  void write_back(int ve, std::string_view exported);
+  void write_back(int ve, const std::string& exported);
   std::string referee(int ve, std::string_view exported, std::array<double, 9> velocity_gradient, long steps);
   VeInfo info(int ve);
   /// Holds the slot's velocity gradient for its number of steps; the mean stress into the slot where it is asked for.
@@ -52,6 +52,9 @@ class Engine {
   void flush();
 
  private:
+  template <class... Arguments>
+  void call(const char* method, Arguments&&... arguments);
+
   pybind11::scoped_interpreter interpreter_;
   pybind11::object engine_;
 };

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <stdexcept>
 
 #include "compact_cell.hpp"
@@ -9,14 +12,6 @@
 #include "hash.hpp"
 
 namespace femxdem {
-namespace {
-
-using RowMajor2 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Tensor2 tensor(const std::array<double, 9>& numbers) { return Eigen::Map<const RowMajor2>(numbers.data()); }
-
-}  // namespace
-
 PythonVolumeElements::PythonVolumeElements(WorkerProcess& worker, VolumeElementOptions options)
     : worker_(worker), options_(std::move(options)) {}
 
@@ -77,11 +72,32 @@ std::vector<Response> PythonVolumeElements::evaluate(std::span<const Tensor2> F,
     worker_.slot(i).task = plans[i].refusal ? Task::skip : Task::deform;
     responses[i].failure = plans[i].refusal;
   }
+  worker_.be_patient(patience(plans));
   run_trial(wanted == Operator::elastic, responses);
+  note_cost(plans);
   for (std::size_t i = 0; i < size(); ++i)
     if (!responses[i].failure) read(i, plans[i], wanted, responses[i]);
   trial_failed_ = std::any_of(responses.begin(), responses.end(), [](const Response& r) { return r.failure; });
   return responses;
+}
+
+/// A hundred times what the dearest DEM step so far would take: a process that waits for a processor is no dead one.
+double PythonVolumeElements::patience(const std::vector<Straining>& plans) const {
+  constexpr double kTimes = 100, kLeast = 60;  // [-], [s]
+  if (seconds_per_step_ == 0) return std::numeric_limits<double>::infinity();
+  long most = 1;
+  for (const Straining& plan : plans) most = std::max(most, plan.steps);
+  return std::max(kLeast, kTimes * seconds_per_step_ * static_cast<double>(most));
+}
+
+void PythonVolumeElements::note_cost(const std::vector<Straining>& plans) {
+  constexpr auto seconds = std::find(kReportFields.begin(), kReportFields.end(), "seconds") - kReportFields.begin();
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Slot& slot = worker_.slot(i);
+    if (slot.task != Task::deform || slot.outcome != Outcome::answered) continue;
+    seconds_per_step_ =
+        std::max(seconds_per_step_, slot.report[seconds] / static_cast<double>(std::max(plans[i].steps, 1L)));
+  }
 }
 
 Straining PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {
@@ -137,8 +153,7 @@ void PythonVolumeElements::read(std::size_t index, const Straining& straining, O
 
 void PythonVolumeElements::commit() {
   if (size() == 0) return;
-  if (!trial_pending_) throw std::logic_error("commit: there is no trial");
-  if (trial_failed_) throw std::logic_error("commit: a volume element failed in this trial");
+  require_committable(trial_pending_, trial_failed_);
   peak_memory_ = std::max(peak_memory_, worker_.memory());
   const auto request = [&] {
     for (std::size_t i = 0; i < size(); ++i)
@@ -174,29 +189,23 @@ std::vector<PointReport> PythonVolumeElements::reports() const {
   return reports;
 }
 
-SavedStates PythonVolumeElements::save() {
+void PythonVolumeElements::save_each(const TakeState& take) {
   drop_trial();
-  SavedStates states;
-  for (std::size_t i = 0; i < size(); ++i) {
-    states.push_back(save_one(i));
-  }
+  for (std::size_t i = 0; i < size(); ++i) take(save_one(i), std::array{i});
   begin_step();
-  return states;
 }
 
-void PythonVolumeElements::load(const SavedStates& states) {
-  if (states.size() != size())
-    throw UserError(fmt::format("checkpoint: {} volume elements saved, {} expected", states.size(), size()));
+void PythonVolumeElements::load_into(std::span<const std::size_t> points, const std::string& state) {
   drop_trial();
-  for (std::size_t i = 0; i < size(); ++i) {
-    const StrainedPoint& point = points_[i];
-    const VeState state =
-        decode(states[i]).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, states[i]});
-    const bool compact = state.engine == EngineKind::compact;
-    if (compact) require_origin(state.origin, point.origin);
+  for (const std::size_t i : points) {
+    const StrainedPoint& point = points_.at(i);
+    const VeState saved =
+        decode(state).value_or(VeState{EngineKind::yade, point.reference_time_scale, point.origin, state});
+    const bool compact = saved.engine == EngineKind::compact;
+    if (compact) require_origin(saved.origin, point.origin);
     worker_.request(compact ? Command::write_back : Command::load, static_cast<std::int64_t>(i), 0,
-                    compact ? CompactCell::load(state.bytes).to_scene() : state.bytes);
-    points_[i].reference_time_scale = state.reference_time_scale;
+                    compact ? CompactCell::load(saved.bytes).to_scene() : saved.bytes);
+    points_[i].reference_time_scale = saved.reference_time_scale;
     adopt_state(i);
   }
   begin_step();

@@ -46,11 +46,13 @@ class PythonVolumeElements : public LocalPoints {
   /// Throws std::logic_error without a trial or after a trial that failed.
   void commit() override;
   std::vector<PointReport> reports() const override;
-  SavedStates save() override;
-  void load(const SavedStates& states) override;
+  void save_each(const TakeState& take) override;
+  void load_into(std::span<const std::size_t> points, const std::string& state) override;
 
  private:
   Straining plan(std::size_t index, const Tensor2& F);
+  double patience(const std::vector<Straining>& plans) const;  ///< with one volume element of the next trial [s]
+  void note_cost(const std::vector<Straining>& plans);
   void run_trial(bool with_stiffness, std::vector<Response>& responses);
   void fail_after_deaths(std::vector<Response>& responses, std::vector<int>& deaths, std::int64_t status);
   void read(std::size_t index, const Straining& straining, Operator wanted, Response& response);
@@ -62,6 +64,7 @@ class PythonVolumeElements : public LocalPoints {
   VolumeElementOptions options_;
   std::vector<StrainedPoint> points_;
   std::uint64_t peak_memory_ = 0;
+  double seconds_per_step_ = 0;  ///< most that a DEM step has taken so far [s]
   bool trial_pending_ = false;
   bool trial_failed_ = false;
   bool with_stiffness_ = false;  ///< the pending trial

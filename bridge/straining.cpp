@@ -108,4 +108,9 @@ void require_answerable(Operator wanted, std::size_t gradients, std::size_t poin
   if (gradients != points) throw std::invalid_argument("evaluate: one deformation gradient per volume element");
 }
 
+void require_committable(bool trial_pending, bool trial_failed) {
+  if (!trial_pending) throw std::logic_error("commit: there is no trial");
+  if (trial_failed) throw std::logic_error("commit: a volume element failed in this trial");
+}
+
 }  // namespace femxdem

@@ -82,10 +82,17 @@ struct Strained {
 void judge(const VolumeElementOptions& options, const Straining& straining, std::size_t index, const Strained& found,
            Response& response);
 
+/// A tensor of numbers that lie row by row.
+inline Tensor2 tensor(const std::array<double, 9>& numbers) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers.data());
+}
+
 /// Throws UserError for a state without pressure: the inertial number sets no rate without a time scale.
 void require_time_scale(double time_scale, double time_step, double mean_stress);
 /// Throws UserError for a stiffness that no volume element has, std::invalid_argument for another number of points.
 void require_answerable(Operator wanted, std::size_t gradients, std::size_t points);
+/// Throws std::logic_error where there is no trial, or one that failed.
+void require_committable(bool trial_pending, bool trial_failed);
 
 inline constexpr const char* kSmallerStep = "Try a smaller load step.";
 

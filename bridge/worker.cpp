@@ -9,8 +9,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <map>
 #include <stdexcept>
 
+#include "end_signals.hpp"
 #include "mailbox.hpp"
 
 namespace femxdem {
@@ -41,12 +43,6 @@ void die_with(pid_t parent) {
   if (getppid() != parent) _exit(1);
 }
 
-constexpr std::size_t kReport(std::string_view field) {
-  for (std::size_t k = 0; k < kReportFields.size(); ++k)
-    if (kReportFields[k] == field) return k;
-  throw std::out_of_range("no such report");
-}
-
 void write_sentence(Slot& slot, const char* text) {
   slot.outcome = Outcome::failed;
   std::strncpy(slot.sentence.data(), text, slot.sentence.size() - 1);
@@ -67,42 +63,36 @@ void Worker::serve() {
 }
 
 void Worker::answer(const Message& message) {
-  const bool changes_states = message.command == Command::add || message.command == Command::remove ||
-                              message.command == Command::save || message.command == Command::load ||
-                              message.command == Command::write_back || message.command == Command::referee;
-  if (changes_states) snapshot_.clear();
-  if (changes_states && message.command != Command::save && message.command != Command::load) restored_.clear();
-  switch (message.command) {
-    case Command::versions:
-      return reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, engine_.versions()));
-    case Command::make_template:
-      return make_template(message);
-    case Command::add:
-      return add(message);
-    case Command::remove:
-      return remove(message);
-    case Command::evaluate:
-      return evaluate(message);
-    case Command::commit:
-      return commit_in_process(message);
-    case Command::reject:
-      return reject_in_process();
-    case Command::save:
-      return save(message);
-    case Command::load:
-      return load(message);
-    case Command::export_scene:
-      return export_scene(message);
-    case Command::write_back:
-      return write_back(message);
-    case Command::referee:
-      return referee(message);
-    case Command::quit:
-      return;
-  }
+  using Answer = void (Worker::*)(const Message&);
+  static const std::map<Command, Answer> answers = {
+      {Command::versions, &Worker::versions},
+      {Command::make_template, &Worker::make_template},
+      {Command::add, &Worker::add},
+      {Command::remove, &Worker::remove},
+      {Command::evaluate, &Worker::evaluate},
+      {Command::commit, &Worker::commit_in_process},
+      {Command::save, &Worker::save},
+      {Command::load, &Worker::load},
+      {Command::export_scene, &Worker::export_scene},
+      {Command::write_back, &Worker::write_back},
+      {Command::referee, &Worker::referee},
+  };
+  if (message.command == Command::reject) return reject_in_process();
+  (this->*answers.at(message.command))(message);
+}
+
+/// The volume elements are about to be others, or to be in other states.
+void Worker::forget_states() {
+  snapshot_.clear();
+  restored_.clear();
+}
+
+void Worker::versions(const Message& message) {
+  reply(message, ReplyKind::done, 0, put_mail(kMailDescriptor, engine_.versions()));
 }
 
 void Worker::add(const Message& message) {
+  forget_states();
   const std::string state = get_mail(kMailDescriptor, message.mail);
   if (ves_.size() + static_cast<std::size_t>(message.a) > Batch::kCapacity)
     throw std::runtime_error("too many volume elements for one rank; use more ranks");
@@ -114,6 +104,7 @@ void Worker::add(const Message& message) {
 }
 
 void Worker::remove(const Message& message) {
+  forget_states();
   const auto index = static_cast<std::size_t>(message.a);
   engine_.remove(ves_.at(index));
   ves_.erase(ves_.begin() + message.a);
@@ -127,6 +118,7 @@ void Worker::export_scene(const Message& message) {
 }
 
 void Worker::write_back(const Message& message) {
+  forget_states();
   const auto index = static_cast<std::size_t>(message.a);
   engine_.write_back(ves_.at(index), get_mail(kMailDescriptor, message.mail));
   refresh(index);
@@ -134,6 +126,7 @@ void Worker::write_back(const Message& message) {
 }
 
 void Worker::referee(const Message& message) {
+  forget_states();
   const std::string task = get_mail(kMailDescriptor, message.mail);
   std::array<double, 9> L;
   std::memcpy(L.data(), task.data(), sizeof L);
@@ -156,6 +149,7 @@ void Worker::load(const Message& message) {
 }
 
 void Worker::restore(std::size_t index, const std::string& state) {
+  snapshot_.clear();
   engine_.replace(ves_.at(index), state);
   restored_.resize(ves_.size());
   restored_[index] = state;
@@ -231,12 +225,11 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
   complete_reports();
-  restored_.clear();
   follow_networks();
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
   batch_.child = 0;
-  snapshot_.clear();
+  forget_states();
   reply(message, ReplyKind::done, getpid());
   while (getppid() == committed) usleep(100);  // until its memory is freed; then the rank is the parent
   die_with(rank_);
@@ -245,9 +238,8 @@ void Worker::adopt_trial(const Message& message, pid_t committed) {
 void Worker::commit_in_process(const Message& message) {
   if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
   trial_in_process_ = false;
-  snapshot_.clear();
+  forget_states();
   complete_reports();
-  restored_.clear();
   follow_networks();
   reply(message, ReplyKind::done, getpid());
 }
@@ -308,7 +300,7 @@ void Worker::deform_one(std::size_t index, std::int64_t stiffness) {
     write_sentence(slot, error.what());
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  slot.report[kReport("seconds")] = seconds.count();
+  slot.report[report_index("seconds")] = seconds.count();
 }
 
 }  // namespace femxdem
@@ -318,12 +310,12 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const auto rank = static_cast<pid_t>(std::stol(argv[3]));
   die_with(rank);
-  std::signal(SIGINT, SIG_IGN);  // the rank decides
   Message ready;
   try {
     Batch& batch = *static_cast<Batch*>(map_shared(kBatchDescriptor, sizeof(Batch)));
     Engine engine(argv[1], argv[2]);
-    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL, SIGTERM}) std::signal(signal, SIG_DFL);
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL}) std::signal(signal, SIG_DFL);
+    ignore_end_signals();  // importing YADE has handled some
     reply(ready, ReplyKind::done, getpid());
     Worker(engine, batch, rank).serve();
     engine.flush();

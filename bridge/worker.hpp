@@ -26,6 +26,8 @@ class Worker {
 
  private:
   void answer(const Message& message);
+  void forget_states();
+  void versions(const Message& message);
   void add(const Message& message);
   void make_template(const Message& message);
   void evaluate(const Message& message);

@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -18,6 +19,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "end_signals.hpp"
 #include "errors.hpp"
 #include "locations.hpp"
 #include "mailbox.hpp"
@@ -120,6 +122,7 @@ void WorkerProcess::start() {
   if (pid_ < 0) throw system_error("worker: cannot be started");
   if (pid_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ignore_end_signals();
     if (const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC); nothing >= 0) dup2(nothing, STDIN_FILENO);
     place_descriptors({ends[1], batch_descriptor_, mail_descriptor_});
     execve(argv[0], argv.data(), envp.data());
@@ -151,8 +154,10 @@ void WorkerProcess::end() {
 Reply WorkerProcess::request(Command command, std::int64_t a, std::int64_t b, std::string_view mail) {
   wait_until_ready();
   const std::uint32_t number = send(command, a, b, mail);
-  const Reply reply =
-      receive(number, command, command == Command::make_template ? command_.template_timeout : command_.point_timeout);
+  const double timeout = command == Command::make_template ? command_.template_timeout
+                         : command == Command::evaluate    ? std::min(patience_, command_.point_timeout)
+                                                           : command_.point_timeout;
+  const Reply reply = receive(number, command, timeout);
   if (reply.kind == ReplyKind::error) throw UserError(this->mail(reply));
   return reply;
 }
@@ -186,17 +191,17 @@ std::uint32_t WorkerProcess::send(Command command, std::int64_t a, std::int64_t 
 }
 
 Reply WorkerProcess::receive(std::uint32_t number, Command command, double timeout) {
-  auto progress = Clock::now();
+  double waited = 0;  // [s] without progress, counted: who is suspended along with the worker has not waited
   std::int64_t seen = batch_->in_flight;
   for (;;) {
     pollfd waiting{socket_, POLLIN, 0};
-    if (poll(&waiting, 1, 1000) <= 0) {
+    if (const int arrived = poll(&waiting, 1, 1000); arrived <= 0) {
+      if (arrived == 0) waited += 1;
       if (const std::int64_t now = batch_->in_flight; now != seen) {
         seen = now;
-        progress = Clock::now();
+        waited = 0;
       }
-      const bool late = Clock::now() - progress > std::chrono::duration<double>(timeout);
-      if (const std::int64_t child = batch_->child; late && child > 0) kill(static_cast<pid_t>(child), SIGKILL);
+      if (waited > timeout) end_what_is_late(waited > 2 * timeout);
       continue;
     }
     Reply reply;
@@ -212,6 +217,12 @@ Reply WorkerProcess::receive(std::uint32_t number, Command command, double timeo
     if (command == Command::commit && reply.kind == ReplyKind::child_died)
       throw UserError(fmt::format("the trial ended with {} while it was committed", describe_wait_status(reply.value)));
   }
+}
+
+/// The forked process, whose end the committed one reports; the committed one where it works itself or reports nothing.
+void WorkerProcess::end_what_is_late(bool reported_nothing) {
+  const auto child = static_cast<pid_t>(batch_->child.load());
+  kill(child > 0 && !reported_nothing ? child : pid_, SIGKILL);
 }
 
 void WorkerProcess::adopt(pid_t pid) {

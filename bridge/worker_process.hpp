@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -44,11 +45,14 @@ class WorkerProcess {
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  /// Sends a command and waits for its reply. A forked child that makes no progress for the time allowed is ended.
+  /// Sends a command and waits for its reply. A forked child that makes no progress for the time allowed is ended, and
+  /// so is a worker that answers nothing for that time without one, or for twice that time.
   /// Throws UserError with the engine's sentence on ReplyKind::error, WorkerLost if the worker is gone.
   Reply request(Command command, std::int64_t a = 0, std::int64_t b = 0, std::string_view mail = {});
   /// Sends a command that has no reply.
   void tell(Command command);
+  /// From now on a trial may work so long on one volume element, if that is less than the command's point_timeout [s].
+  void be_patient(double seconds) { patience_ = seconds; }
   /// What a reply left in the mailbox.
   std::string mail(const Reply& reply) const;
 
@@ -68,6 +72,7 @@ class WorkerProcess {
   void wait_until_ready();
   std::uint32_t send(Command command, std::int64_t a, std::int64_t b, std::string_view mail);
   Reply receive(std::uint32_t number, Command command, double timeout);
+  void end_what_is_late(bool reported_nothing);
   void reap();
   void end();
 
@@ -80,6 +85,7 @@ class WorkerProcess {
   std::vector<pid_t> retired_;  ///< former committed processes that still have to be reaped
   std::uint32_t sent_ = 0;
   bool ready_ = false;
+  double patience_ = std::numeric_limits<double>::infinity();  ///< [s]
 };
 
 }  // namespace femxdem

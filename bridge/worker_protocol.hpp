@@ -72,12 +72,9 @@ enum class Outcome : std::int64_t { none, answered, failed };
 
 /// What the rank needs to choose rate and number of steps; see yade_scripts/protocol.py, info.
 struct VeInfo {
-  double time_step = 0;   ///< [s]
-  double time_scale = 0;  ///< a sqrt(rho / p) [s]
-  double volume = 0;      ///< [m^3]
-  double spheres = 0;
-  double mean_diameter = 0;  ///< [m]
-  double mean_stress = 0;    ///< [Pa], compression positive
+  double time_step = 0;    ///< [s]
+  double time_scale = 0;   ///< a sqrt(rho / p) [s]
+  double mean_stress = 0;  ///< [Pa], compression positive
 };
 
 /// One volume element in shared memory. Tensors are row-major.

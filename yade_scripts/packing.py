@@ -196,7 +196,7 @@ class _CompactServo(_Servo):
     def take_over(self):
         """Goes on from what the scene is now."""
         self.cell = compact_scene.cell(self.O)
-        self.stress, self.unbalanced = self.cell.stress, self.cell.unbalanced_force
+        self.stress, self.unbalanced = self.cell.stress, lambda: self.cell.report()["unbalanced_force"]
 
     def _go(self, rate):
         self.cell.deform(rate * unit_of_time.of(self.O).in_a_second, self.EVERY)

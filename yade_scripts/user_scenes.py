@@ -11,6 +11,7 @@ from pathlib import Path
 
 from script_exits import Left, catch_exits, left
 from script_inputs import recorded
+from script_limits import Limits
 from script_windows import close_windows, drop_nothings
 
 
@@ -27,13 +28,14 @@ def load_scene(O, path):
         ) from error
 
 
-def run_script(O, path, arguments, steps, seconds):
+def run_script(O, path, arguments, steps, seconds, memory, output):
     """Runs `path` as `yade -n path arguments...` would, in __main__ (where YADE looks for the names of hooks).
 
     Windows are not opened: yade.qt is replaced by a module that answers to any name. A simulation left running in the
     background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. The script is
     stopped where it is when its scene has made `steps` DEM steps, or, for want of steps, after `seconds` of wall time; it may
-    end its process in whatever way: the scene is then what it is at that moment.
+    end its process in whatever way: the scene is then what it is at that moment. `memory` [GB] and `output` [MB]: see
+    script_limits.py.
     Returns (sentences on what was special, {file that it read: hash}). Raises ValueError when the script is missing, fails, or
     one of its hooks does.
     """
@@ -42,7 +44,7 @@ def run_script(O, path, arguments, steps, seconds):
     names = _main_module(O, path, arguments)
     here, notes, run_calls, graphics = os.getcwd(), [], [], drop_nothings(O)
     undo = [_limit_steps(O, steps, run_calls), catch_exits(O), graphics]
-    with recorded(O, path) as recorder:
+    with recorded(O, path) as recorder, Limits(memory, output) as limits:
         try:
             _run_it(O, path, names, run_calls, seconds, notes)
         finally:
@@ -52,6 +54,8 @@ def run_script(O, path, arguments, steps, seconds):
             for back in undo:
                 back()
             os.chdir(here)
+    if limits.said_too_much():
+        notes.append(f"what the script printed after {output:g} MB was left out")
     if graphics.dropped:
         notes.append(f"{graphics.dropped} engines of the graphics were left out")
     if recorder.programs:

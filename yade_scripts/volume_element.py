@@ -26,7 +26,7 @@ import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS}  # of what a case leaves out
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "script_memory": 8.0, "script_output": 100.0}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
@@ -96,7 +96,8 @@ class Engine:
             itself.dismiss()
             raise
         grains = _grains(self.O)
-        manifest.update(self._geometry(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(self._scales(grains), **self._equilibrium(grains), **self._contact_network())
+        manifest.update(spheres=grains.count, mean_diameter=grains.mean_diameter, volume=self.O.cell.volume)
         manifest["sliding_contacts"], manifest["adhesive_contacts"] = self._contact_states(grains)
         manifest["porosity"] = 1 - grains.solid_volume / self.O.cell.volume
         manifest["scene_unit_of_time"] = grains.unit.seconds(1.0)
@@ -159,7 +160,7 @@ class Engine:
             user_scenes.load_scene(self.O, spec["scene"])
             return [], {}
         if spec["source"] == "script":
-            limits = spec["script_steps"], spec["script_seconds"]
+            limits = [spec["script_" + what] for what in ("steps", "seconds", "memory", "output")]
             return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
         raise ValueError(f"ve.source = \"{spec['source']}\" is unknown: use \"prepare\", \"scene\" or \"script\".")
 
@@ -216,7 +217,7 @@ class Engine:
 
     def info(self, ve):
         self._select(ve)
-        return self._geometry(self._grains[ve])
+        return self._scales(self._grains[ve])
 
     def deform(self, ve, velocity_gradient, steps, sample_every=0, late=0.0, out_mean=None):
         self._select(ve)
@@ -334,17 +335,11 @@ class Engine:
             return compact_scene.stress(self.O)
         return np.array(self._utils.getStress()).reshape(3, 3)
 
-    def _geometry(self, grains):
+    def _scales(self, grains):
         """The numbers of protocol.py's info()."""
-        pressure = -np.trace(self._love_weber()) / 3
-        return {
-            "time_step": grains.unit.seconds(self.O.dt),
-            "time_scale": _time_scale(grains, pressure),
-            "volume": self.O.cell.volume,
-            "spheres": grains.count,
-            "mean_diameter": grains.mean_diameter,
-            "mean_stress": float(pressure),
-        }
+        pressure = float(-np.trace(self._love_weber()) / 3)
+        time_scale = _time_scale(grains, pressure)
+        return {"time_step": grains.unit.seconds(self.O.dt), "time_scale": time_scale, "mean_stress": pressure}
 
     def _equilibrium(self, grains):
         """What a trial is judged by."""

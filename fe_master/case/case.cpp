@@ -4,6 +4,7 @@
 #include <map>
 #include <random>
 
+#include "formulation.hpp"
 #include "mesh.hpp"
 
 namespace femxdem {
@@ -24,7 +25,7 @@ VePool ve_pool(const Case& c, const Mesh& mesh) {
       pool.templates.push_back(*ve);
       if (!seeds.empty()) pool.templates.back().seed = seeds[draw];
     }
-    pool.template_of_element.push_back(entry->second);
+    pool.template_of_point.insert(pool.template_of_point.end(), kPointsPerElement, entry->second);
   }
   return pool;
 }

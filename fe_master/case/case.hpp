@@ -89,10 +89,10 @@ std::string case_hash(const Case& c);
 /// make_template).
 std::string ve_spec_json(const VeParameters& ve);
 
-/// Volume elements to prepare, and which of them each element of the mesh starts from.
+/// Volume elements to prepare, and which of them each Gauss point of the mesh starts from.
 struct VePool {
   std::vector<VeParameters> templates;  ///< each with its own seed; only those in use, in order of first use
-  std::vector<int> template_of_element;
+  std::vector<int> template_of_point;   ///< the same for all points of an element
 };
 /// Pool of volume elements of a case on its mesh: base and regions ([[ve.region]]) times seeds. Depends on the case
 /// alone.

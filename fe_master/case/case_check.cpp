@@ -33,7 +33,6 @@ void refuse(Mistakes& m, const std::string& section, const Keys& keys, const std
 }
 
 // ---- mesh and regions
-// ------------------------------------------------------------------------------------------------
 
 void check_mesh_keys(const Case& c, Mistakes& m) {
   const Keys rectangle = {"width", "height", "nx", "ny"}, annulus = {"inner_radius", "outer_radius", "nr", "nt"};
@@ -136,7 +135,6 @@ std::set<std::string> check_regions(const Case& c, const std::optional<Mesh>& me
 }
 
 // ---- element, material, volume element
-// -------------------------------------------------------------------------------
 
 void check_element(const Case& c, Mistakes& m) {
   if (c.element.type == ElementType::axisymmetric)
@@ -240,7 +238,6 @@ void check_region_names(const std::vector<R>& regions, const std::string& sectio
 }
 
 // ---- control, solver, monitors
-// ---------------------------------------------------------------------------------------
 
 void check_control(const Case& c, Mistakes& m) {
   require(m, "control", {"end_time", "step"}, "s");
@@ -336,7 +333,6 @@ void check_monitors(const Case& c, const std::optional<std::set<std::string>>& e
 }
 
 // ---- path
-// ------------------------------------------------------------------------------------------------------------
 
 void check_segment(const PathSegment& s, const std::string& key, Mistakes& m) {
   const bool F = s.deformation_gradient.size() == 9;
@@ -404,8 +400,7 @@ const std::map<VePreset, PresetSettings> kPresets = {
 void complete_case(Case& c, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
-  if (!is_given(c.solver.tolerance)) c.solver.tolerance = ve ? 5e-3 : 1e-8;
-  if (!is_given(c.solver.displacement_tolerance)) c.solver.displacement_tolerance = ve ? 0.1 : 1e-6;
+  c.solver = with_default_tolerances(c.solver, ve);
   if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
   if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
   const auto complete_ve = [&](VeParameters& v, const auto& given) {

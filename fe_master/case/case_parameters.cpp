@@ -135,73 +135,84 @@ Section<MaterialParameters> material_section() {
                      "isotropic stress of the reference state, compression positive")}};
 }
 
-Section<VeParameters> ve_section() {
+/// The cell and how it is made.
+std::vector<Parameter<VeParameters>> packing_parameters() {
+  using V = VeParameters;
+  return {word("preset", &V::preset, {"", "fast", "balanced", "accurate"},
+               "gives spheres and inertial_number where they are not given: README of validation/speed_accuracy"),
+          word("source", &V::source, {"prepare", "scene", "script"},
+               "prepare: a packing by the numbers below; scene: a saved one; script: a user's YADE script"),
+          path("script", &V::script, "YADE script, run unchanged, then adopted"),
+          path("scene", &V::scene, "saved scene (.yade.gz, .xml.bz2), adopted"),
+          parameter("arguments", &V::arguments, "", kAny, "command-line arguments of the script"),
+          parameter("script_steps", &V::script_steps, "", kAtLeastOne, "the script is stopped after so many DEM steps"),
+          parameter("script_seconds", &V::script_seconds, "s", kPositive, "and after so long, for want of steps"),
+          parameter("spheres", &V::spheres, "", {20.0, 1e6}, "number of spheres"),
+          parameter("size_ratio", &V::size_ratio, "", {1.0, 20.0}, "largest over smallest diameter"),
+          parameter("kappa", &V::kappa, "", {1.0, 1e7}, "stiffness k_n / (sigma_0 a)"),
+          parameter("stiffness_ratio", &V::stiffness_ratio, "", kPositive, "k_n / k_t"),
+          parameter("friction", &V::friction, "", {0.0, 10.0}, "mu, inter-granular"),
+          parameter("cohesion", &V::cohesion, "", kNotNegative, "p* = f_c / (sigma_0 a^2)"),
+          word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction", "paper"},
+               "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none; paper: f_n = "
+               "k_n delta - f_c, |f_t| <= mu k_n delta, in compact cells alone: README of validation/contact_laws"),
+          parameter("viscous_damping", &V::viscous_damping, "", {0.0, 2.0},
+                    "paper: dashpot of a contact's normal / the critical one"),
+          word("new_contacts", &V::new_contacts, {"frictional", "adhesive"},
+               "contacts that form after the preparation: without adhesion, or adhesive as the others"),
+          parameter("compaction_friction", &V::compaction_friction, "", {0.0, 10.0},
+                    "mu while the packing is made: 0 is the densest"),
+          parameter("confining_stress", &V::confining_stress, "Pa", kPositive, "sigma_0, compression positive"),
+          parameter("mean_diameter", &V::mean_diameter, "m", kPositive, "a"),
+          parameter("density", &V::density, "kg/m3", kPositive, "of the grains"),
+          parameter("seed", &V::seed, "", kNotNegative, "of the preparation"),
+          parameter("damping", &V::damping, "", {0.0, 0.95}, "local damping of YADE's integrator")};
+}
+
+/// How it is strained, and which element gets which.
+std::vector<Parameter<VeParameters>> trial_parameters() {
   using V = VeParameters;
   return {
-      "ve",
-      "volume element (VE): a periodic cell of grains in YADE",
-      {word("preset", &V::preset, {"", "fast", "balanced", "accurate"},
-            "gives spheres and inertial_number where they are not given: README of validation/speed_accuracy"),
-       word("source", &V::source, {"prepare", "scene", "script"},
-            "prepare: a packing by the numbers below; scene: a saved one; script: a user's YADE script"),
-       path("script", &V::script, "YADE script, run unchanged, then adopted"),
-       path("scene", &V::scene, "saved scene (.yade.gz, .xml.bz2), adopted"),
-       parameter("arguments", &V::arguments, "", kAny, "command-line arguments of the script"),
-       parameter("script_steps", &V::script_steps, "", kAtLeastOne, "the script is stopped after so many DEM steps"),
-       parameter("script_seconds", &V::script_seconds, "s", kPositive, "and after so long, for want of steps"),
-       parameter("spheres", &V::spheres, "", {20.0, 1e6}, "number of spheres"),
-       parameter("size_ratio", &V::size_ratio, "", {1.0, 20.0}, "largest over smallest diameter"),
-       parameter("kappa", &V::kappa, "", {1.0, 1e7}, "stiffness k_n / (sigma_0 a)"),
-       parameter("stiffness_ratio", &V::stiffness_ratio, "", kPositive, "k_n / k_t"),
-       parameter("friction", &V::friction, "", {0.0, 10.0}, "mu, inter-granular"),
-       parameter("cohesion", &V::cohesion, "", kNotNegative, "p* = f_c / (sigma_0 a^2)"),
-       word("contact_law", &V::contact_law, {"adhesive", "bonded", "friction", "paper"},
-            "adhesive: cohesion survives sliding; bonded: the first sliding breaks it; friction: none; paper: f_n = "
-            "k_n delta - f_c, |f_t| <= mu k_n delta, in compact cells alone: README of validation/contact_laws"),
-       parameter("viscous_damping", &V::viscous_damping, "", {0.0, 2.0},
-                 "paper: dashpot of a contact's normal / the critical one"),
-       word("new_contacts", &V::new_contacts, {"frictional", "adhesive"},
-            "contacts that form after the preparation: without adhesion, or adhesive as the others"),
-       parameter("compaction_friction", &V::compaction_friction, "", {0.0, 10.0},
-                 "mu while the packing is made: 0 is the densest"),
-       parameter("confining_stress", &V::confining_stress, "Pa", kPositive, "sigma_0, compression positive"),
-       parameter("mean_diameter", &V::mean_diameter, "m", kPositive, "a"),
-       parameter("density", &V::density, "kg/m3", kPositive, "of the grains"),
-       parameter("seed", &V::seed, "", kNotNegative, "of the preparation"),
-       parameter("damping", &V::damping, "", {0.0, 0.95}, "local damping of YADE's integrator"),
-       parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
-       word("answer", &V::answer, {"end", "mean"},
-            "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do"),
-       parameter("mean_at", &V::mean_at, "", {0.5, 2.0 / 3},
-                 "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
-       parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
-       parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
-       parameter("start_at_rest", &V::start_at_rest, "", kAny, "paper: a trial begins without velocities"),
-       parameter("hold_steps", &V::hold_steps, "", kNotNegative,
-                 "paper: DEM steps without strain at the end of a trial that strains"),
-       parameter("freeze_steps", &V::freeze_steps, "", kAny,
-                 "the DEM steps of a load step's trials are those of its first; false: for comparison only"),
-       parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
-                 "an answer above is refused as unstable"),
-       word("stiffness", &V::stiffness, {"affine", "relaxed"},
-            "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium"),
-       word("engine", &V::engine, {"auto", "yade", "compact"},
-            "what strains it: YADE, or compact cells, which make YADE's step to the bit; auto: compact where they can"),
-       parameter("check_every", &V::check_every, "", kNotNegative,
-                 "one trial of compact cells in so many is repeated in YADE; 0: about 20 in a run"),
-       parameter("threads", &V::threads, "", kNotNegative,
-                 "of a rank, for compact cells; 0: the processors that it may use"),
-       parameter("balance", &V::balance, "", kAny,
-                 "at checkpoints volume elements move to other ranks where that pays; the results are the same"),
-       parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
-                 "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
-       word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),
-       parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
-       word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
-       parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
-       parameter("cache", &V::cache, "", kAny,
-                 "folder of prepared packings; empty: packings in the working folder, or in that of the results where "
-                 "the former cannot be written")}};
+      parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
+      word("answer", &V::answer, {"end", "mean"},
+           "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do"),
+      parameter("mean_at", &V::mean_at, "", {0.5, 2.0 / 3},
+                "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
+      parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
+      parameter("min_steps", &V::min_steps, "", kAtLeastOne, "least DEM steps of a trial that strains"),
+      parameter("start_at_rest", &V::start_at_rest, "", kAny, "paper: a trial begins without velocities"),
+      parameter("hold_steps", &V::hold_steps, "", kNotNegative,
+                "paper: DEM steps without strain at the end of a trial that strains"),
+      parameter("freeze_steps", &V::freeze_steps, "", kAny,
+                "the DEM steps of a load step's trials are those of its first; false: for comparison only"),
+      parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
+                "an answer above is refused as unstable"),
+      word("stiffness", &V::stiffness, {"affine", "relaxed"},
+           "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium"),
+      word("engine", &V::engine, {"auto", "yade", "compact"},
+           "what strains it: YADE, or compact cells, which make YADE's step to the bit; auto: compact where they can"),
+      parameter("check_every", &V::check_every, "", kNotNegative,
+                "one trial of compact cells in so many is repeated in YADE; 0: about 20 in a run"),
+      parameter("threads", &V::threads, "", kNotNegative,
+                "of a rank, for compact cells; 0: the processors that it may use"),
+      parameter("balance", &V::balance, "", kAny,
+                "at checkpoints volume elements move to other ranks where that pays; the results are the same"),
+      parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
+                "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
+      word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),
+      parameter("seeds", &V::seeds, "", kNotNegative, "pool of VEs, one a seed; empty: only seed"),
+      word("assignment", &V::assignment, {"same", "random"}, "of the pool to the elements"),
+      parameter("assignment_seed", &V::assignment_seed, "", kNotNegative, "of the random assignment"),
+      parameter("cache", &V::cache, "", kAny,
+                "folder of prepared packings; empty: packings in the working folder, or in that of the results where "
+                "the former cannot be written")};
+}
+
+Section<VeParameters> ve_section() {
+  Section<VeParameters> section{"ve", "volume element (VE): a periodic cell of grains in YADE", packing_parameters()};
+  const std::vector<Parameter<VeParameters>> trials = trial_parameters();
+  section.parameters.insert(section.parameters.end(), trials.begin(), trials.end());
+  return section;
 }
 
 Section<Load> load_section() {
@@ -298,12 +309,13 @@ Section<SolverParameters> solver_section() {
 
 Section<OutputParameters> output_section() {
   using O = OutputParameters;
-  return {
-      "output",
-      "files of a run",
-      {parameter("directory", &O::directory, "", kAny, "folder of the results; --out comes before it"),
-       parameter("every", &O::every, "", kAtLeastOne, "steps between field outputs"),
-       parameter("checkpoint_every", &O::checkpoint_every, "", kNotNegative, "steps between checkpoints; 0: none")}};
+  return {"output",
+          "files of a run",
+          {parameter("directory", &O::directory, "", kAny, "folder of the results; --out comes before it"),
+           parameter("every", &O::every, "", kAtLeastOne, "steps between field outputs"),
+           parameter("checkpoint_every", &O::checkpoint_every, "", kNotNegative, "steps between checkpoints; 0: none"),
+           parameter("checkpoint_minutes", &O::checkpoint_minutes, "min", kNotNegative,
+                     "wall time after which a step is followed by a checkpoint; 0: none")}};
 }
 
 Section<Monitor> monitor_section() {

@@ -84,8 +84,10 @@ void for_each_section(C& c, Visitor&& visit) {
   visit(s.path, c.path);
 }
 
-/// "number", "list of 4 integers", "rectangle | annulus", ...
+/// "number", "4 integers", ...
 std::string kind_name(Kind kind, std::size_t size);
+/// "rectangle | annulus", without empty words.
+std::string either(const std::vector<std::string>& words);
 /// ">= 0", "> 0 and < 1", or empty.
 std::string bounds_text(const Bounds& bounds);
 /// Whether a value says anything: not so NaN, an empty text or list, an integer below its bounds.

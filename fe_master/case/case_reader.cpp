@@ -31,7 +31,6 @@ std::string text_of(const toml::node& node) {
 }
 
 // ---- overrides
-// -------------------------------------------------------------------------------------------------------
 
 /// An override as a node of its own: TOML, or else a bare word as a text.
 toml::table parse_value(const std::string& text) {
@@ -74,7 +73,6 @@ void apply_override(toml::table& root, const std::string& text, Mistakes& mistak
 }
 
 // ---- values
-// ----------------------------------------------------------------------------------------------------------
 
 std::optional<int> integer(const toml::node& node) {
   const auto value = node.value_exact<std::int64_t>();
@@ -150,16 +148,7 @@ std::string a_value_of(Kind kind, std::size_t size) {
   return article + kind_name(kind, size);
 }
 
-std::string either(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& word : words) {
-    if (!word.empty()) out += (out.empty() ? "" : " | ") + word;
-  }
-  return out;
-}
-
 // ---- sections
-// --------------------------------------------------------------------------------------------------------
 
 template <class S>
 S fresh(const Case&, const std::vector<S>&) {

@@ -6,6 +6,7 @@
 #include "case_parameters.hpp"
 #include "hash.hpp"
 #include "output_folder.hpp"
+#include "summary.hpp"
 
 namespace femxdem {
 
@@ -17,22 +18,10 @@ std::string number_text(double x) {
   return text.find_first_of(".einf") == std::string::npos ? text + ".0" : text;
 }
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char character : text) {
-    if (character == '"' || character == '\\') out += '\\';
-    if (static_cast<unsigned char>(character) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<int>(character));
-    else
-      out += character;
-  }
-  return out + "\"";
-}
-
 std::string item_text(bool x) { return x ? "true" : "false"; }
 std::string item_text(int x) { return std::to_string(x); }
 std::string item_text(double x) { return number_text(x); }
-std::string item_text(const std::string& x) { return quoted(x); }
+std::string item_text(const std::string& x) { return quoted_text(x); }
 std::string item_text(const std::array<double, 2>& x) {
   return fmt::format("[{}, {}]", number_text(x[0]), number_text(x[1]));
 }
@@ -75,11 +64,7 @@ std::string default_text(const Parameter<S>& p) {
 
 template <class S>
 void describe(std::string& out, const Parameter<S>& p) {
-  std::string words;
-  for (const std::string& word : p.words) {
-    if (!word.empty()) words += (words.empty() ? "" : " | ") + word;
-  }
-  const std::string allowed = p.kind == Kind::word ? words : bounds_text(p.bounds);
+  const std::string allowed = p.kind == Kind::word ? either(p.words) : bounds_text(p.bounds);
   const std::string separator = allowed.empty() || p.text.empty() ? "" : "; ";
   out += fmt::format("  {:<24}{:<18}{:<12}{:<18}{}{}{}\n", p.key, kind_name(p.kind, p.size),
                      p.unit.empty() ? "-" : p.unit, default_text(p), allowed, separator, p.text);
@@ -157,6 +142,14 @@ std::string kind_name(Kind kind, std::size_t size) {
                                                  "numbers",       "texts",   "pairs of numbers", "word", "path"};
   const std::string name = names.at(static_cast<std::size_t>(kind));
   return size == 0 ? name : fmt::format("{} {}", size, name);
+}
+
+std::string either(const std::vector<std::string>& words) {
+  std::string out;
+  for (const std::string& word : words) {
+    if (!word.empty()) out += (out.empty() ? "" : " | ") + word;
+  }
+  return out;
 }
 
 std::string bounds_text(const Bounds& bounds) {

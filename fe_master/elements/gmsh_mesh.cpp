@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <set>
 
 #include "errors.hpp"
 #include "mesh.hpp"
@@ -164,6 +165,13 @@ void add_sides_of_curve(int group, const std::string& name, const std::string& f
         throw UserError(fmt::format(
             "{}: physical curve '{}' is a side of {} elements; name curves of the boundary only", file, name, owners));
       const Side& side = all.find(middle->second)->second;
+      std::set<int> ends;
+      for (const std::size_t end : {lines.nodes[3 * l], lines.nodes[3 * l + 1]})
+        if (number.count(end) > 0) ends.insert(number.at(end));
+      if (ends != std::set<int>{side.nodes[0], side.nodes[2]})
+        throw UserError(fmt::format("{}: line {} of physical curve '{}' has the middle of an element's side but not its "
+                                    "ends; open the mesh in Gmsh and export it again",
+                                    file, lines.tags[l], name));
       const bool known = std::any_of(sides.begin(), sides.end(), [&](const Side& s) { return s.nodes == side.nodes; });
       if (!known) sides.push_back(side);
     }

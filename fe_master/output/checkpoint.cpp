@@ -3,53 +3,63 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <string_view>
 #include <unordered_map>
 
 #include "disk_file.hpp"
 #include "errors.hpp"
-#include "hdf5_file.hpp"
+#include "sealed_file.hpp"
 
 namespace femxdem {
 namespace {
 
-void write_states(Hdf5File& h5, const SavedStates& states) {
-  std::unordered_map<std::string_view, int> number_of;
-  std::vector<int> number_of_point;
-  for (const std::string& state : states) {
-    const auto [entry, is_new] = number_of.emplace(state, static_cast<int>(number_of.size()));
-    if (is_new) h5.write_bytes(fmt::format("/states/{:06d}", entry->second), state);
-    number_of_point.push_back(entry->second);
-  }
-  h5.write("/state_of_point", number_of_point, {number_of_point.size()});
-}
+namespace fs = std::filesystem;
 
-SavedStates read_states(const Hdf5File& h5) {
-  std::vector<std::string> distinct;
-  for (const std::string& name : h5.members("/states")) distinct.push_back(h5.read_bytes("/states/" + name));
-  SavedStates states;
-  for (const double number : h5.read("/state_of_point"))
-    states.push_back(distinct.at(static_cast<std::size_t>(number)));
-  return states;
-}
+std::string place_of(int state) { return fmt::format("/states/{:06d}", state); }
+
+/// The states as they come, equal ones once.
+class StateWriter {
+ public:
+  StateWriter(Hdf5File& h5, std::size_t points) : h5_(h5), number_of_point_(points) {}
+
+  void take(const std::string& state, std::span<const std::size_t> points) {
+    const int number = number_of(state);
+    for (const std::size_t point : points) number_of_point_[point] = number;
+  }
+  void finish() { h5_.write("/state_of_point", number_of_point_, {number_of_point_.size()}); }
+  std::size_t states() const { return known_.size(); }
+
+ private:
+  /// Of equal hashes the bytes are compared with those in the file.
+  int number_of(const std::string& state) {
+    const std::size_t hash = std::hash<std::string_view>()(state);
+    const auto [first, last] = known_.equal_range(hash);
+    for (auto entry = first; entry != last; ++entry)
+      if (h5_.read_bytes(place_of(entry->second)) == state) return entry->second;
+    const int number = static_cast<int>(known_.size());
+    h5_.reserve(state.size(), 1);
+    h5_.write_bytes(place_of(number), state);
+    known_.emplace(hash, number);
+    return number;
+  }
+
+  Hdf5File& h5_;
+  std::unordered_multimap<std::size_t, int> known_;  // hash -> number
+  std::vector<int> number_of_point_;
+};
 
 std::uint64_t size_of(const Checkpoint& checkpoint) {
-  std::uint64_t bytes = 4 * checkpoint.states.size() + checkpoint.case_text.size();
+  std::uint64_t bytes = checkpoint.case_text.size();
   for (const auto& [name, values] : checkpoint.arrays) bytes += 8 * values.size();
-  std::unordered_map<std::string_view, int> distinct;
-  for (const std::string& state : checkpoint.states)
-    if (distinct.emplace(state, 0).second) bytes += state.size();
   return bytes;
 }
 
-void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint) {
+std::size_t write_file(const fs::path& file, const Checkpoint& checkpoint, MaterialPoints& points) {
   Hdf5File h5(file, Hdf5File::Mode::create);
-  h5.reserve(size_of(checkpoint), checkpoint.arrays.size() + checkpoint.states.size() + checkpoint.versions.size() + 8);
+  h5.reserve(size_of(checkpoint) + 4 * points.size(), checkpoint.arrays.size() + checkpoint.versions.size() + 8);
   h5.set_attribute("/", "step", checkpoint.step);
   h5.set_attribute("/", "time", checkpoint.time);
   h5.set_attribute("/", "dt", checkpoint.dt);
-  h5.set_attribute("/", "case_hash", checkpoint.case_hash);
   h5.make_group("/versions");
   for (const auto& [name, version] : checkpoint.versions) h5.set_attribute("/versions", name, version);
   int order = 0;
@@ -58,77 +68,107 @@ void write_file(const std::filesystem::path& file, const Checkpoint& checkpoint)
     h5.write(group + "/values", values, {values.size()});
     h5.set_attribute(group, "name", name);
   }
-  if (!checkpoint.case_text.empty()) h5.write_bytes("/case", checkpoint.case_text);
-  write_states(h5, checkpoint.states);
+  h5.write_bytes("/case", checkpoint.case_text);
+  StateWriter states(h5, points.size());
+  points.save_each(
+      [&](const std::string& state, std::span<const std::size_t> of_points) { states.take(state, of_points); });
+  states.finish();
   h5.finish();
+  return states.states();
 }
 
-void refuse_other_case(const std::filesystem::path& file, const Hdf5File& h5, const std::string& case_hash) {
-  const std::string theirs = h5.text("/", "case_hash");
-  if (theirs == case_hash) return;
-  throw UserError(fmt::format(
-      "{}: belongs to another case (hash {}, this case has {}); restart with the case it was written by or choose "
-      "another --out",
-      file.string(), theirs, case_hash));
-}
-
-void refuse_other_versions(const std::filesystem::path& file, const Hdf5File& h5,
-                           const std::map<std::string, std::string>& versions) {
-  const std::vector<std::string> written_with = h5.attributes("/versions");
-  for (const auto& [name, version] : versions) {
-    if (std::find(written_with.begin(), written_with.end(), name) == written_with.end()) continue;
-    const std::string theirs = h5.text("/versions", name);
-    if (theirs == version) continue;
-    throw UserError(fmt::format(
-        "{}: written with {} {}, this program has {}: states cannot be read across versions; use the version it was "
-        "written with or start without --restart",
-        file.string(), name, theirs, version));
+/// What else there is to restart from.
+std::string offer(const fs::path& file) {
+  const fs::path previous = previous_checkpoint(file);
+  if (broken_seal(previous)) return "; start without --restart";
+  try {
+    const int step = static_cast<int>(Hdf5File(previous, Hdf5File::Mode::read).number("/", "step"));
+    return fmt::format("; the one before it, after step {}, is whole: `mv {} {}`, then --restart goes on from there",
+                       step, previous.string(), file.string());
+  } catch (const Hdf5Error&) {
+    return "; start without --restart";
   }
-}
-
-Checkpoint read_contents(const Hdf5File& h5) {
-  Checkpoint checkpoint;
-  checkpoint.step = static_cast<int>(h5.number("/", "step"));
-  checkpoint.time = h5.number("/", "time");
-  checkpoint.dt = h5.number("/", "dt");
-  checkpoint.case_hash = h5.text("/", "case_hash");
-  for (const std::string& name : h5.attributes("/versions")) checkpoint.versions[name] = h5.text("/versions", name);
-  for (const std::string& order : h5.members("/arrays")) {
-    const std::string group = "/arrays/" + order;
-    checkpoint.arrays.emplace_back(h5.text(group, "name"), h5.read(group + "/values"));
-  }
-  checkpoint.states = read_states(h5);
-  return checkpoint;
 }
 
 }  // namespace
 
-void write_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint) {
-  std::filesystem::path beside = file;
+fs::path previous_checkpoint(const fs::path& file) {
+  fs::path previous = file;
+  return previous.replace_filename(file.stem().string() + ".previous" + file.extension().string());
+}
+
+CheckpointSize write_checkpoint(const fs::path& file, const Checkpoint& checkpoint, MaterialPoints& points) {
+  fs::path beside = file;
   beside += ".new";
+  CheckpointSize size;
   try {
-    write_file(beside, checkpoint);
+    size.states = write_file(beside, checkpoint, points);
+    seal(beside);
+    size.bytes = fs::file_size(beside);
+    keep_as(file, previous_checkpoint(file));
     put_in_place(beside, file);
   } catch (const DiskError&) {
     std::error_code ignored;
-    std::filesystem::remove(beside, ignored);
+    fs::remove(beside, ignored);
     throw;
+  }
+  return size;
+}
+
+template <class Read>
+auto CheckpointFile::read_or_refuse(Read read) const {
+  try {
+    return read();
+  } catch (const Hdf5Error& error) {
+    throw UserError(
+        fmt::format("{}: is no checkpoint of this program ({}){}", file_.string(), error.what(), offer(file_)));
   }
 }
 
-Checkpoint read_checkpoint(const std::filesystem::path& file, const std::string& case_hash,
-                           const std::map<std::string, std::string>& versions) {
-  if (!std::filesystem::exists(file)) {
-    throw UserError(fmt::format("{}: no checkpoint to restart from; start without --restart", file.string()));
+CheckpointFile::CheckpointFile(const fs::path& file) : file_(file) {
+  const std::string name = file.string();
+  if (!fs::exists(file)) throw UserError(fmt::format("{}: no checkpoint to restart from{}", name, offer(file)));
+  if (const auto fault = broken_seal(file)) throw UserError(fmt::format("{}: {}{}", name, *fault, offer(file)));
+  h5_ = read_or_refuse([&] { return std::make_unique<Hdf5File>(file, Hdf5File::Mode::read); });
+}
+
+void CheckpointFile::refuse_other_versions(const std::map<std::string, std::string>& versions) const {
+  const std::vector<std::string> written_with = h5_->attributes("/versions");
+  for (const auto& [name, version] : versions) {
+    if (std::find(written_with.begin(), written_with.end(), name) == written_with.end()) continue;
+    const std::string theirs = h5_->text("/versions", name);
+    if (theirs == version) continue;
+    throw UserError(fmt::format(
+        "{}: written with {} {}, this program has {}: states cannot be read across versions; use the version it was "
+        "written with or start without --restart",
+        file_.string(), name, theirs, version));
   }
-  try {
-    const Hdf5File h5(file, Hdf5File::Mode::read);
-    refuse_other_case(file, h5, case_hash);
-    refuse_other_versions(file, h5, versions);
-    return read_contents(h5);
-  } catch (const Hdf5Error&) {
-    throw UserError(fmt::format("{}: is not a whole checkpoint; start without --restart", file.string()));
-  }
+}
+
+Checkpoint CheckpointFile::read(const std::map<std::string, std::string>& versions) const {
+  return read_or_refuse([&] {
+    refuse_other_versions(versions);
+    Checkpoint checkpoint;
+    checkpoint.step = static_cast<int>(h5_->number("/", "step"));
+    checkpoint.time = h5_->number("/", "time");
+    checkpoint.dt = h5_->number("/", "dt");
+    checkpoint.case_text = h5_->read_bytes("/case");
+    for (const std::string& name : h5_->attributes("/versions"))
+      checkpoint.versions[name] = h5_->text("/versions", name);
+    for (const std::string& order : h5_->members("/arrays")) {
+      const std::string group = "/arrays/" + order;
+      checkpoint.arrays.emplace_back(h5_->text(group, "name"), h5_->read(group + "/values"));
+    }
+    return checkpoint;
+  });
+}
+
+StateSource CheckpointFile::states() const {
+  StateSource source;
+  for (const double number : read_or_refuse([&] { return h5_->read("/state_of_point"); }))
+    source.number_of_point.push_back(static_cast<int>(number));
+  source.read = [this](int number) { return read_or_refuse([&] { return h5_->read_bytes(place_of(number)); }); };
+  return source;
 }
 
 }  // namespace femxdem

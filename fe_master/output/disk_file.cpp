@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -32,6 +33,11 @@ int write_all(int descriptor, std::string_view text) {
   return 0;
 }
 
+off_t size_of(int descriptor) {
+  struct stat found {};
+  return fstat(descriptor, &found) == 0 ? found.st_size : 0;
+}
+
 /// Writes zeros behind the file's end, where the file system reserves nothing; 0, or the system's reason.
 int grow_by_zeros(int descriptor, off_t size, std::uint64_t bytes) {
   const std::string zeros(1 << 16, '\0');
@@ -52,12 +58,28 @@ AppendedFile::AppendedFile(const fs::path& file, bool keep)
     : file_(file),
       descriptor_(open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | (keep ? 0 : O_TRUNC), 0666)) {
   if (descriptor_ < 0) fail(file_, errno);
+  size_ = size_of(descriptor_);
 }
 
 AppendedFile::~AppendedFile() { close(descriptor_); }
 
 void AppendedFile::write(std::string_view text) {
   if (const int reason = write_all(descriptor_, text); reason != 0) fail(file_, reason);
+  size_ = std::max(size_, size_of(descriptor_));
+}
+
+bool AppendedFile::is_in_place() const {
+  struct stat named {}, held {};
+  return stat(file_.c_str(), &named) == 0 && fstat(descriptor_, &held) == 0 && named.st_ino == held.st_ino &&
+         named.st_dev == held.st_dev && held.st_size >= size_;
+}
+
+void AppendedFile::open_again() {
+  const int descriptor = open(file_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (descriptor < 0) fail(file_, errno);
+  close(descriptor_);
+  descriptor_ = descriptor;
+  size_ = size_of(descriptor_);
 }
 
 void replace_file(const fs::path& file, std::string_view text) {
@@ -86,6 +108,19 @@ void reserve_space(const fs::path& file, std::uint64_t bytes) {
   }
   close(descriptor);
   if (reason != 0) fail(file, reason);
+}
+
+void keep_as(const fs::path& file, const fs::path& other) {
+  if (!fs::exists(file)) return;
+  const std::string link_name = other.string() + ".new";
+  unlink(link_name.c_str());
+  if (link(file.c_str(), link_name.c_str()) != 0) {
+    if (rename(file.c_str(), other.c_str()) != 0) fail(other, errno);
+    return;
+  }
+  const int reason = rename(link_name.c_str(), other.c_str()) == 0 ? 0 : errno;
+  unlink(link_name.c_str());  // rename leaves it where both are one file already
+  if (reason != 0) fail(other, reason);
 }
 
 void put_in_place(const fs::path& beside, const fs::path& file) {

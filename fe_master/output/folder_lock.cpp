@@ -6,7 +6,6 @@
 
 #include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -64,28 +63,25 @@ bool is_over(const Owner& owner) {
   return start.empty() || start != owner.start;
 }
 
-/// Creates the lock; false when there is one.
+/// Creates the lock; false when there is one. It appears with its text: it is written beside and linked.
 bool create(const fs::path& file, const Owner& owner) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0 && errno == EEXIST) return false;
+  const std::string beside = fmt::format("{}.{}", file.string(), owner.process);
+  const int descriptor = open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   const std::string text = fmt::format("{} {} {} {}\n", owner.host, owner.boot, owner.process, owner.start);
   const bool written =
       descriptor >= 0 && write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  const int reason = errno;
+  int reason = errno;
   if (descriptor >= 0) close(descriptor);
-  if (written) return true;
-  if (descriptor >= 0) unlink(file.c_str());
+  const bool linked = written && link(beside.c_str(), file.c_str()) == 0;
+  if (written && !linked) reason = errno;
+  unlink(beside.c_str());
+  if (linked) return true;
+  if (written && reason == EEXIST) return false;
   throw DiskError(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(reason)));
 }
 
-/// The lock of this process, for the handler of signals: it may only call what is safe there.
+/// The lock of this process, for a handler of signals: it may only call what is safe there.
 std::array<char, 4096> held_file{};
-
-void let_go_and_die(int number) {
-  if (held_file[0] != '\0') unlink(held_file.data());
-  std::signal(number, SIG_DFL);
-  raise(number);
-}
 
 }  // namespace
 
@@ -113,14 +109,16 @@ FolderLock::FolderLock(const fs::path& folder) : file_(fs::absolute(folder) / "r
     if (!moved) fs::remove(mine, moved);
   }
   if (file_.string().size() < held_file.size()) std::strcpy(held_file.data(), file_.c_str());
-  for (const int number : {SIGTERM, SIGINT, SIGHUP})
-    if (std::signal(number, let_go_and_die) == SIG_IGN) std::signal(number, SIG_IGN);  // nohup
 }
 
 FolderLock::~FolderLock() {
   held_file[0] = '\0';
   std::error_code ignored;
   fs::remove(file_, ignored);
+}
+
+void let_go_of_lock() {
+  if (held_file[0] != '\0') unlink(held_file.data());
 }
 
 }  // namespace femxdem

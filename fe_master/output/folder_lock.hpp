@@ -10,7 +10,7 @@ namespace femxdem {
 ///
 /// The lock of a process of this host that has ended (killed, or of before a reboot) is taken over; `remark` then says
 /// so. Throws UserError while the other run lives, or where it is of another host and cannot be asked. The file goes
-/// with this object, and on SIGTERM, SIGINT and SIGHUP.
+/// with this object, or with let_go_of_lock().
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);
@@ -24,5 +24,8 @@ class FolderLock {
   std::filesystem::path file_;
   std::string remark_;
 };
+
+/// Removes the lock of this process, if it holds one. Safe in a handler of signals.
+void let_go_of_lock();
 
 }  // namespace femxdem

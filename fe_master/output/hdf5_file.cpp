@@ -8,10 +8,12 @@
 #include <cstring>
 #include <functional>
 #include <numeric>
+#include <system_error>
 #include <utility>
 
 #include "disk_file.hpp"
 #include "errors.hpp"
+#include "undo_driver.hpp"
 
 namespace femxdem {
 namespace {
@@ -48,13 +50,18 @@ hid_t string_type(std::size_t length) {
 
 }  // namespace
 
-Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file) {
+Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file), mode_(mode) {
   H5dont_atexit();  // at the end of the program it would write again what could not be written
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are exceptions, not text on stderr
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access, false, true);
   const std::string name = file.string();
+  if (mode == Mode::update) {
+    undo_unfinished_update(file);
+    H5Pset_driver(access, undo_driver(), nullptr);
+  }
   if (mode == Mode::create) {
+    std::filesystem::remove(undo_file(file));
     id_ = H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
   } else {
     id_ = H5Fopen(name.c_str(), mode == Mode::read ? H5F_ACC_RDONLY : H5F_ACC_RDWR, access);
@@ -69,8 +76,12 @@ Hdf5File::~Hdf5File() {
 
 void Hdf5File::reserve(std::uint64_t bytes, std::size_t data_sets) {
   constexpr std::uint64_t kTables = 1024, kFile = 16384;  // header and place in its group: 630 bytes as measured
+  hsize_t end = 0;  // what it has given out already may lie behind the end of the file
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file_, error);
+  if (H5Fget_filesize(id_, &end) < 0 || error || end < size) end = size;
   try {
-    reserve_space(file_, bytes + kTables * data_sets + kFile);
+    reserve_space(file_, end - size + bytes + kTables * data_sets + kFile);
   } catch (const DiskError&) {
     broken_ = true;
     throw;
@@ -81,6 +92,7 @@ void Hdf5File::finish() {
   if (H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0) fail_to_write("write", "/");
   const hid_t id = std::exchange(id_, -1);
   if (H5Fclose(id) < 0) fail_to_write("close", "/");
+  if (mode_ == Mode::update) std::filesystem::remove(undo_file(file_));
 }
 
 void Hdf5File::fail_to_write(std::string_view what, std::string_view path) {

@@ -19,10 +19,12 @@ struct Hdf5Error : std::runtime_error {
 
 /// An HDF5 file, open as long as the object lives. A failure to read is an Hdf5Error that names file and data set, one
 /// to write a DiskError with the system's reason; HDF5 does not survive a full disk, so space is reserved before. Paths
-/// inside the file start with '/'; missing groups on the way are made.
+/// inside the file start with '/'; missing groups on the way are made. An update that does not come to finish(), in
+/// whatever way, is undone by the next one (undo_driver.hpp).
 class Hdf5File {
  public:
-  enum class Mode { create, read, update };  ///< create truncates; read and update want an existing file
+  /// create truncates; read and update want an existing file
+  enum class Mode { create, read, update };
 
   /// Opens without file locks: a reader such as ParaView must not stop a run that goes on writing.
   Hdf5File(const std::filesystem::path& file, Mode mode);
@@ -69,6 +71,7 @@ class Hdf5File {
   void set_scalar(const std::string& group, const std::string& name, const void* value, std::int64_t type);
 
   std::filesystem::path file_;
+  Mode mode_;
   std::int64_t id_ = -1;
   bool broken_ = false;  ///< a write failed: HDF5 must not touch the file again
 };

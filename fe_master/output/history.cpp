@@ -38,7 +38,7 @@ std::string kept_rows(const std::filesystem::path& file, const std::string& expe
 
 History::History(const std::filesystem::path& file, const std::vector<std::string>& monitors, Existing existing,
                  int last_step)
-    : monitors_(monitors.size()) {
+    : file_(file), monitors_(monitors.size()) {
   const bool goes_on = existing == Existing::resume && std::filesystem::exists(file);
   replace_file(file, goes_on ? kept_rows(file, header(monitors), last_step) : header(monitors));
   stream_.emplace(file, true);
@@ -46,6 +46,8 @@ History::History(const std::filesystem::path& file, const std::vector<std::strin
 
 void History::add(const StepRecord& record) {
   assert(record.monitors.size() == monitors_);
+  if (!stream_->is_in_place())
+    throw DiskError(fmt::format("{}: has been removed or changed since the run wrote it", file_.string()));
   std::string row =
       fmt::format("{},{:.17g},{:.17g},{},{},{:.17g},{},{:.17g}", record.step, record.time, record.load_factor,
                   record.iterations, record.evaluations, record.dem_steps, record.histories, record.residual);

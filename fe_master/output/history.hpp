@@ -32,9 +32,11 @@ class History {
   History(const std::filesystem::path& file, const std::vector<std::string>& monitors, Existing existing,
           int last_step = 0);
 
+  /// Throws DiskError where the row cannot be written, or where earlier ones are no longer there.
   void add(const StepRecord& record);
 
  private:
+  std::filesystem::path file_;
   std::size_t monitors_;
   std::optional<AppendedFile> stream_;
 };

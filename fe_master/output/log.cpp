@@ -45,7 +45,11 @@ void Log::say(std::string_view line) {
   note(line);
 }
 
-void Log::note(std::string_view line) { stream_.write(fmt::format("{}\n", line)); }
+/// A log that somebody has removed begins anew: it is no result.
+void Log::note(std::string_view line) {
+  if (!stream_.is_in_place()) stream_.open_again();
+  stream_.write(fmt::format("{}\n", line));
+}
 
 /// A terminal that cannot be written stops no run.
 void Log::print(std::string_view text) {

@@ -17,8 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kFilesOfARun = {"results.h5", "results.xdmf", "history.csv",   "summary.json",
-                                     "log.txt",    "case.toml",    "checkpoint.h5", "checkpoint.h5.new"};
+constexpr std::array kFilesOfARun = {
+    "results.h5", "results.h5.undo", "results.xdmf",  "history.csv",       "summary.json",
+    "log.txt",    "case.toml",       "checkpoint.h5", "checkpoint.h5.new", "checkpoint.previous.h5"};
 
 void remove_results(const fs::path& folder) {
   for (const char* name : kFilesOfARun) fs::remove(folder / name);

@@ -4,6 +4,8 @@
 
 #include <cassert>
 
+#include "errors.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -111,7 +113,7 @@ void Results::create(const Mesh& mesh, std::span<const Point2> points) {
   h5.finish();
 }
 
-void Results::resume(int last_step) {
+void Results::resume(int last_step) try {
   Hdf5File h5(folder_ / kFile, Hdf5File::Mode::update);
   for (const std::string& step : h5.members("/steps")) {
     if (std::stoi(step) > last_step) {
@@ -121,10 +123,14 @@ void Results::resume(int last_step) {
     }
   }
   h5.finish();
+} catch (const Hdf5Error& error) {
+  throw UserError(
+      fmt::format("{}; the file is damaged: move it away to go on from the checkpoint without its steps, or restore it",
+                  error.what()));
 }
 
 void Results::write(const FieldStep& step) {
-  {
+  try {
     Hdf5File h5(folder_ / kFile, Hdf5File::Mode::update);
     const std::string group = group_of(step.step);
     std::uint64_t bytes = 0;
@@ -147,6 +153,8 @@ void Results::write(const FieldStep& step) {
     }
     grids_[step.step] = grid(h5, fmt::format("{:06d}", step.step));
     h5.finish();
+  } catch (const Hdf5Error& error) {
+    throw DiskError(fmt::format("{}; it has been removed or changed since the run wrote it", error.what()));
   }
   write_xdmf();
 }

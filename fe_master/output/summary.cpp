@@ -17,7 +17,23 @@
 namespace femxdem {
 namespace {
 
-std::string json_string(std::string_view text) {
+std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.15g}", value) : "null"; }
+
+using Members = std::vector<std::pair<std::string, std::string>>;
+
+std::string object(const Members& members, std::string_view indent) {
+  std::string json = "{";
+  std::string_view separator = "\n";
+  for (const auto& [key, value] : members) {
+    json += fmt::format("{}{}  {}: {}", separator, indent, quoted_text(key), value);
+    separator = ",\n";
+  }
+  return json + fmt::format("\n{}}}", indent);
+}
+
+}  // namespace
+
+std::string quoted_text(std::string_view text) {
   std::string json = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') {
@@ -31,37 +47,21 @@ std::string json_string(std::string_view text) {
   return json + "\"";
 }
 
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.15g}", value) : "null"; }
-
-using Members = std::vector<std::pair<std::string, std::string>>;
-
-std::string object(const Members& members, std::string_view indent) {
-  std::string json = "{";
-  std::string_view separator = "\n";
-  for (const auto& [key, value] : members) {
-    json += fmt::format("{}{}  {}: {}", separator, indent, json_string(key), value);
-    separator = ",\n";
-  }
-  return json + fmt::format("\n{}}}", indent);
-}
-
-}  // namespace
-
 std::string to_json(const Summary& summary, const std::string& date, const std::string& host) {
   const double capacity = summary.ranks * summary.threads * summary.evaluate_seconds;
   Members versions;
-  for (const auto& [name, version] : summary.versions) versions.emplace_back(name, json_string(version));
+  for (const auto& [name, version] : summary.versions) versions.emplace_back(name, quoted_text(version));
   const Members members = {
-      {"status", json_string(summary.status)},
-      {"message", json_string(summary.message)},
+      {"status", quoted_text(summary.status)},
+      {"message", quoted_text(summary.message)},
       {"exit_status", number(summary.exit_status)},
       {"steps", number(summary.steps)},
       {"evaluations", number(static_cast<double>(summary.evaluations))},
       {"dem_steps", number(summary.dem_steps)},
       {"ranks", number(summary.ranks)},
       {"threads", number(summary.threads)},
-      {"engine", json_string(summary.engine)},
-      {"engine_check", json_string(summary.engine_check)},
+      {"engine", quoted_text(summary.engine)},
+      {"engine_check", quoted_text(summary.engine_check)},
       {"wall_seconds", number(summary.wall_seconds)},
       {"evaluate_seconds", number(summary.evaluate_seconds)},
       {"trial_seconds", number(summary.trial_seconds)},
@@ -73,12 +73,15 @@ std::string to_json(const Summary& summary, const std::string& date, const std::
       {"imbalance_before", number(summary.moved > 0 ? summary.imbalance_before : std::nan(""))},
       {"imbalance_after", number(summary.moved > 0 ? summary.imbalance_after : std::nan(""))},
       {"moved", number(static_cast<double>(summary.moved))},
+      {"checkpoints", number(summary.checkpoints)},
+      {"checkpoint_seconds", number(summary.checkpoint_seconds)},
+      {"checkpoint_bytes", number(static_cast<double>(summary.checkpoint_bytes))},
       {"peak_memory_master_bytes", number(static_cast<double>(summary.peak_memory_master))},
       {"peak_memory_workers_bytes", number(static_cast<double>(summary.peak_memory_workers))},
-      {"case_hash", json_string(summary.case_hash)},
-      {"date", json_string(date)},
-      {"host", json_string(host)},
-      {"command_line", json_string(summary.command_line)},
+      {"case_hash", quoted_text(summary.case_hash)},
+      {"date", quoted_text(date)},
+      {"host", quoted_text(host)},
+      {"command_line", quoted_text(summary.command_line)},
       {"versions", object(versions, "  ")},
   };
   return object(members, "") + "\n";

@@ -4,12 +4,13 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 
 namespace femxdem {
 
 /// How a run ended and what it cost: summary.json.
 struct Summary {
-  std::string status;   ///< "done", "not converged", "failed"
+  std::string status;   ///< "done", "stopped", "not converged", "failed"
   std::string message;  ///< one sentence
   int exit_status = 0;
   int steps = 0;         ///< converged
@@ -27,6 +28,9 @@ struct Summary {
   double imbalance_before = 0;            ///< busiest rank over the mean when points last moved; 0: they never did
   double imbalance_after = 0;             ///< and then
   long moved = 0;                         ///< points, in the whole run
+  int checkpoints = 0;                    ///< written
+  double checkpoint_seconds = 0;          ///< in all
+  std::uint64_t checkpoint_bytes = 0;     ///< of the last file
   std::uint64_t peak_memory_master = 0;   ///< [byte]
   std::uint64_t peak_memory_workers = 0;  ///< summed over the ranks [byte]
   std::string case_hash;
@@ -38,6 +42,9 @@ struct Summary {
 /// seconds of evaluate), `engine_share` = engine seconds / (the same), `overhead_ratio` = 1 - engine_share; null where
 /// unknown.
 std::string to_json(const Summary& summary, const std::string& date, const std::string& host);
+
+/// A text between quotes as JSON and TOML want it.
+std::string quoted_text(std::string_view text);
 
 /// Writes it with the date (UTC, ISO 8601) and the name of this machine.
 void write_summary(const std::filesystem::path& file, const Summary& summary);

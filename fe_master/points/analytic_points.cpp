@@ -1,7 +1,6 @@
 #include "analytic_points.hpp"
 
-#include <fmt/format.h>
-
+#include <array>
 #include <cassert>
 #include <cstring>
 
@@ -45,21 +44,18 @@ std::vector<Response> AnalyticPoints::evaluate(std::span<const Tensor2> F, Opera
   return responses;
 }
 
-SavedStates AnalyticPoints::save() {
-  SavedStates states;
-  for (const LawState& state : committed_) states.push_back(to_bytes(state));
-  return states;
+void AnalyticPoints::save_each(const TakeState& take) {
+  for (std::size_t i = 0; i < size(); ++i) take(to_bytes(committed_[i]), std::array{i});
 }
 
-void AnalyticPoints::load(const SavedStates& states) {
-  if (states.size() != size())
-    throw UserError(
-        fmt::format("checkpoint: {} material points, the case has {}; restart with the case it was written by",
-                    states.size(), size()));
-  for (const std::string& state : states)
+void AnalyticPoints::load_each(const StateSource& states) {
+  require_states_of(size(), states);
+  for (const auto& [number, points] : states.points_of_states()) {
+    const std::string state = states.read(number);
     if (state.size() != sizeof(double) * kStateSize)
       throw UserError("checkpoint: its material points are no analytic laws; restart with the case it was written by");
-  for (std::size_t i = 0; i < size(); ++i) committed_[i] = from_bytes(states[i]);
+    for (const std::size_t i : points) committed_[i] = from_bytes(state);
+  }
   trial_ = committed_;
 }
 

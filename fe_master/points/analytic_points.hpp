@@ -13,9 +13,9 @@ class AnalyticPoints : public MaterialPoints {
   std::size_t size() const override { return laws_.size(); }
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { committed_ = trial_; }
-  SavedStates save() override;
+  void save_each(const TakeState& take) override;
   /// Throws UserError when the states are not those of as many points with laws in closed form.
-  void load(const SavedStates& states) override;
+  void load_each(const StateSource& states) override;
 
  private:
   std::vector<AnalyticLaw> laws_;

@@ -3,19 +3,12 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <string_view>
 #include <utility>
 
 namespace femxdem {
 
 Tensor2 quantised(const Tensor2& U) {
   return U.unaryExpr([](double value) { return std::nearbyint(value / kQuantum) * kQuantum; });
-}
-
-EqualHistories::EqualHistories(std::span<const std::string> states) {
-  std::map<std::string_view, int> known;
-  for (const std::string& state : states)
-    committed_.push_back(known.try_emplace(state, static_cast<int>(known.size())).first->second);
 }
 
 std::size_t EqualHistories::trial(std::span<const Tensor2> F) {

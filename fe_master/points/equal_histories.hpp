@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "tensor.hpp"
@@ -17,8 +16,7 @@ Tensor2 quantised(const Tensor2& U);
 /// Which points have had the same history so far: the same start, and stretches equal up to kQuantum ever since.
 class EqualHistories {
  public:
-  /// Points with equal states have an equal start.
-  explicit EqualHistories(std::span<const std::string> states = {});
+  /// Points with equal numbers have an equal start.
   explicit EqualHistories(std::span<const int> starts) : committed_(starts.begin(), starts.end()) {}
 
   /// A trial from the committed histories; returns how many different ones it makes.

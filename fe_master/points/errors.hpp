@@ -21,6 +21,7 @@ enum ExitStatus : int {
   kNotConverged = 3,  ///< every converged step is on the disk
   kPointFailed = 4,   ///< a volume element failed and smaller steps did not help
   kNotWritten = 5,    ///< a file could not be written: disk full, quota
+  kRunAgain = 75,     ///< ended before it was done, because it was told to or its time was over: --restart goes on
 };
 
 }  // namespace femxdem

@@ -1,22 +1,53 @@
 #include "material_points.hpp"
 
-#include <algorithm>
-#include <stdexcept>
+#include <string_view>
+#include <unordered_map>
+
+#include "errors.hpp"
 
 namespace femxdem {
-namespace {
 
-std::size_t report_index(std::string_view field) {
-  const auto found = std::find(kReportFields.begin(), kReportFields.end(), field);
-  if (found == kReportFields.end()) throw std::out_of_range("no report field named " + std::string(field));
-  return static_cast<std::size_t>(found - kReportFields.begin());
+std::vector<std::pair<int, std::vector<std::size_t>>> StateSource::points_of_states() const {
+  std::vector<std::pair<int, std::vector<std::size_t>>> shares;
+  std::unordered_map<int, std::size_t> place;
+  for (std::size_t p = 0; p < number_of_point.size(); ++p) {
+    const auto [entry, is_new] = place.emplace(number_of_point[p], shares.size());
+    if (is_new) shares.emplace_back(number_of_point[p], std::vector<std::size_t>());
+    shares[entry->second].second.push_back(p);
+  }
+  return shares;
 }
 
-}  // namespace
+StateSource source_of(const SavedStates& states) {
+  StateSource source;
+  std::unordered_map<std::string_view, int> first_with;
+  for (std::size_t p = 0; p < states.size(); ++p)
+    source.number_of_point.push_back(first_with.emplace(states[p], static_cast<int>(p)).first->second);
+  source.read = [&states](int number) { return states.at(static_cast<std::size_t>(number)); };
+  return source;
+}
 
-double& PointReport::operator[](std::string_view field) { return values[report_index(field)]; }
+SavedStates MaterialPoints::save() {
+  SavedStates states(size());
+  save_each([&](const std::string& state, std::span<const std::size_t> points) {
+    for (const std::size_t p : points) states[p] = state;
+  });
+  return states;
+}
 
-double PointReport::operator[](std::string_view field) const { return values[report_index(field)]; }
+void MaterialPoints::load(const SavedStates& states) { load_each(source_of(states)); }
+
+void LocalPoints::load_each(const StateSource& states) {
+  require_states_of(size(), states);
+  for (const auto& [number, points] : states.points_of_states()) load_into(points, states.read(number));
+}
+
+void require_states_of(std::size_t points, const StateSource& states) {
+  const std::size_t saved = states.number_of_point.size();
+  if (saved != points)
+    throw UserError("checkpoint: " + std::to_string(saved) + " material points saved, the case has " +
+                    std::to_string(points) + "; restart with the case it was written by");
+}
 
 void commit(MaterialPoints& points, std::span<Response> responses) {
   points.commit();

@@ -2,10 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tensor.hpp"
@@ -38,11 +41,18 @@ inline constexpr std::array<std::string_view, 26> kReportFields = {
 };
 // clang-format on
 
+/// Place of a field in a report; throws std::out_of_range on an unknown one.
+constexpr std::size_t report_index(std::string_view field) {
+  for (std::size_t k = 0; k < kReportFields.size(); ++k)
+    if (kReportFields[k] == field) return k;
+  throw std::out_of_range("no report field named " + std::string(field));
+}
+
 struct PointReport {
   /// In the order of kReportFields; 0 where a law has no such quantity.
   std::array<double, kReportFields.size()> values{};
-  double& operator[](std::string_view field);  ///< throws std::out_of_range on an unknown field
-  double operator[](std::string_view field) const;
+  double& operator[](std::string_view field) { return values[report_index(field)]; }
+  double operator[](std::string_view field) const { return values[report_index(field)]; }
 };
 
 /// Failure of a material point: a value, never an exit.
@@ -71,8 +81,22 @@ enum class Operator {
   tangent,  ///< d sigma / d(spatial gradient) [Pa], spin of the stress included; only for laws in closed form
 };
 
-/// Opaque committed states, one per point, to be written to a checkpoint.
+/// Opaque committed states, one per point.
 using SavedStates = std::vector<std::string>;
+
+/// Takes a committed state and the points that are in it.
+using TakeState = std::function<void(const std::string& state, std::span<const std::size_t> points)>;
+
+/// Saved states, each of them in memory only when it is read.
+struct StateSource {
+  std::vector<int> number_of_point;      ///< of its state; points with equal states have equal numbers
+  std::function<std::string(int)> read;  ///< the state of that number
+  /// Number and points of each state, in the order of their first points.
+  std::vector<std::pair<int, std::vector<std::size_t>>> points_of_states() const;
+};
+
+/// Those of memory.
+StateSource source_of(const SavedStates& states);
 
 /// A batch of material points with a committed and a trial state.
 ///
@@ -97,10 +121,14 @@ class MaterialPoints {
   /// After a commit: the complete reports of the committed state; none where Response::report was complete already. A
   /// trial of volume elements leaves NaN in what does not judge or count it, see complete_report of protocol.py.
   virtual std::vector<PointReport> reports() const { return {}; }
-  /// Committed states; the points themselves go on from exactly what was saved (bit-equal restart).
-  virtual SavedStates save() = 0;
-  /// Replace the committed states by saved ones (size() of them).
-  virtual void load(const SavedStates& states) = 0;
+  /// Hands over the committed states, one after another, of every point once; equal ones perhaps several times. The
+  /// points themselves go on from exactly what was saved (bit-equal restart).
+  virtual void save_each(const TakeState& take) = 0;
+  /// Replaces the committed states by saved ones, of size() points.
+  virtual void load_each(const StateSource& states) = 0;
+  /// The same in memory.
+  SavedStates save();
+  void load(const SavedStates& states);
 };
 
 /// How often a second engine has repeated trials, and how often it has ended in the same state.
@@ -119,14 +147,20 @@ class LocalPoints : public MaterialPoints {
   void copy(std::size_t point) { add(save_one(point), 1); }
   /// Takes a point away; those behind it move up by one.
   virtual void remove(std::size_t point) = 0;
-  /// The committed state of one point, see save().
+  /// The committed state of one point, see save_each().
   virtual std::string save_one(std::size_t point) = 0;
+  /// The committed state of these points becomes this one.
+  virtual void load_into(std::span<const std::size_t> points, const std::string& state) = 0;
+  void load_each(const StateSource& states) override;
   virtual EngineCheck engine_check() const { return {}; }
   /// That work on them.
   virtual int threads() const { return 1; }
   /// Largest memory so far of what stands behind the points [byte].
   virtual std::uint64_t peak_memory() const = 0;
 };
+
+/// Throws UserError where `states` are of another number of points.
+void require_states_of(std::size_t points, const StateSource& states);
 
 /// Commits the last trial and completes the reports of its responses.
 void commit(MaterialPoints& points, std::span<Response> responses);

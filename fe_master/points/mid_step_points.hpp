@@ -35,8 +35,8 @@ class MidStepPoints : public MaterialPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { points_.commit(); }
   std::vector<PointReport> reports() const override { return points_.reports(); }
-  SavedStates save() override { return points_.save(); }
-  void load(const SavedStates& states) override { points_.load(states); }
+  void save_each(const TakeState& take) override { points_.save_each(take); }
+  void load_each(const StateSource& states) override { points_.load_each(states); }
 
  private:
   MaterialPoints& points_;

@@ -41,6 +41,7 @@ class PacketReader {
   void get_doubles(double* numbers, std::size_t count) {
     std::memcpy(numbers, cut(count * sizeof(double)).data(), count * sizeof(double));
   }
+  std::size_t left() const { return rest_.size(); }
   std::string get_text() {
     const auto size = get<std::size_t>();
     return std::string(cut(size));

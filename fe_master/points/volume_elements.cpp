@@ -7,8 +7,10 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "errors.hpp"
 #include "packet.hpp"
@@ -18,7 +20,7 @@ namespace femxdem {
 namespace {
 
 enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, give, take, account, end };
-enum class Verdict : std::int32_t { done, user_error, error };
+enum class Verdict : std::int32_t { done, user_error, error, more };
 
 constexpr int kTag = 0;
 
@@ -97,6 +99,17 @@ Response get_response(PacketReader& packet, bool with_stiffness, std::size_t poi
   return response;
 }
 
+void put_indices(PacketWriter& packet, std::span<const std::size_t> indices) {
+  packet.put(indices.size());
+  for (const std::size_t index : indices) packet.put(index);
+}
+
+std::vector<std::size_t> get_indices(PacketReader& packet) {
+  std::vector<std::size_t> indices(packet.get<std::size_t>());
+  for (std::size_t& index : indices) index = packet.get<std::size_t>();
+  return indices;
+}
+
 /// Input: the templates, then that of each point.
 void add(LocalPoints& local, PacketReader input) {
   std::vector<std::string> templates(input.get<std::size_t>());
@@ -138,16 +151,20 @@ std::string commit(LocalPoints& local) {
   return output.take();
 }
 
-std::string save(LocalPoints& local) {
-  PacketWriter output;
-  for (const std::string& state : local.save()) output.put(state);
-  return output.take();
+/// A message for each state: Verdict::more, its points, itself.
+void hand_over(MPI_Comm communicator, LocalPoints& local) {
+  local.save_each([&](const std::string& state, std::span<const std::size_t> points) {
+    PacketWriter packet;
+    packet.put(static_cast<std::int32_t>(Verdict::more));
+    put_indices(packet, points);
+    packet.put(state);
+    send(communicator, 0, packet.take());
+  });
 }
 
 void load(LocalPoints& local, PacketReader input) {
-  SavedStates states(local.size());
-  for (std::string& state : states) state = input.get_text();
-  local.load(states);
+  const std::vector<std::size_t> points = get_indices(input);
+  if (!points.empty()) local.load_into(points, input.get_text());
 }
 
 /// Input: places of points, ascending. Their states; the points are gone.
@@ -168,7 +185,7 @@ void take(LocalPoints& local, PacketReader input) {
   for (std::size_t i = 0; i < count; ++i) local.add(input.get_text(), 1);
 }
 
-std::string carry_out(Order order, const std::string& input, LocalPoints& local) {
+std::string carry_out(Order order, const std::string& input, LocalPoints& local, MPI_Comm communicator) {
   PacketWriter output;
   switch (order) {
     case Order::add:
@@ -182,7 +199,8 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local)
     case Order::commit:
       return commit(local);
     case Order::save:
-      return save(local);
+      hand_over(communicator, local);
+      break;
     case Order::load:
       load(local, PacketReader(input));
       break;
@@ -218,7 +236,7 @@ double cost(const PointReport& report) {
 }
 
 /// The answer of a rank: verdict, then the output or the text of the exception.
-std::string answer(Order order, const std::string& input, LocalPoints& local) {
+std::string answer(Order order, const std::string& input, LocalPoints& local, MPI_Comm communicator) {
   const auto packed = [](Verdict verdict, std::string_view text) {
     PacketWriter packet;
     packet.put(static_cast<std::int32_t>(verdict));
@@ -226,7 +244,7 @@ std::string answer(Order order, const std::string& input, LocalPoints& local) {
     return packet.take();
   };
   try {
-    return packed(Verdict::done, carry_out(order, input, local));
+    return packed(Verdict::done, carry_out(order, input, local, communicator));
   } catch (const UserError& error) {
     return packed(Verdict::user_error, error.what());
   } catch (const std::exception& error) {
@@ -234,30 +252,35 @@ std::string answer(Order order, const std::string& input, LocalPoints& local) {
   }
 }
 
-/// Outputs of the ranks; throws what the first of them that failed has to say.
-std::vector<std::string> outputs(const std::vector<std::string>& answers) {
+/// Outputs of the ranks from `first` on; throws what the first of them that failed has to say.
+std::vector<std::string> outputs(const std::vector<std::string>& answers, std::size_t first = 0) {
   std::vector<std::string> texts;
   for (std::size_t rank = 0; rank < answers.size(); ++rank) {
     PacketReader packet(answers[rank]);
     const auto verdict = static_cast<Verdict>(packet.get<std::int32_t>());
     texts.push_back(packet.get_text());
     if (verdict == Verdict::user_error) throw UserError(texts.back());
-    if (verdict == Verdict::error) throw std::runtime_error("rank " + std::to_string(rank) + ": " + texts.back());
+    if (verdict == Verdict::error)
+      throw std::runtime_error("rank " + std::to_string(first + rank) + ": " + texts.back());
   }
   return texts;
+}
+
+void give_order(MPI_Comm communicator, Order order, const std::vector<std::string>& inputs) {
+  for (int rank = 1; rank < size_of(communicator); ++rank) {
+    PacketWriter packet;
+    packet.put(static_cast<std::int32_t>(order));
+    packet.put(inputs.empty() ? std::string() : inputs[static_cast<std::size_t>(rank)]);
+    send(communicator, rank, packet.take());
+  }
 }
 
 /// One order to all ranks, each with its own input: their outputs. Rank 0 does its own share meanwhile.
 std::vector<std::string> command(MPI_Comm communicator, Order order, const std::vector<std::string>& inputs,
                                  LocalPoints& local) {
   const int ranks = size_of(communicator);
-  for (int rank = 1; rank < ranks; ++rank) {
-    PacketWriter packet;
-    packet.put(static_cast<std::int32_t>(order));
-    packet.put(inputs.empty() ? std::string() : inputs[static_cast<std::size_t>(rank)]);
-    send(communicator, rank, packet.take());
-  }
-  std::vector<std::string> answers{answer(order, inputs.empty() ? std::string() : inputs[0], local)};
+  give_order(communicator, order, inputs);
+  std::vector<std::string> answers{answer(order, inputs.empty() ? std::string() : inputs[0], local, communicator)};
   for (int rank = 1; rank < ranks; ++rank) answers.push_back(receive(communicator, rank));
   return outputs(answers);
 }
@@ -354,28 +377,75 @@ void VolumeElements::commit() {
   histories_.commit();
 }
 
-SavedStates VolumeElements::save() {
-  const std::vector<std::string> answers = command(communicator_, Order::save, {}, local_);
-  SavedStates states(size());
-  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
-    PacketReader packet(answers[rank]);
-    for (const std::size_t point : shares_[rank]) states[point] = packet.get_text();
+/// Rank 0 takes one state of each rank after each of its own: all work on their next one meanwhile. Who fails, a rank
+/// or the taker, does so after every rank has come to its end.
+void VolumeElements::save_each(const TakeState& take) {
+  const auto& points = shares_;
+  std::exception_ptr failure;
+  const auto pass_on = [&](std::size_t rank, const std::string& state, std::span<const std::size_t> of_rank) {
+    std::vector<std::size_t> of_all;
+    for (const std::size_t p : of_rank) of_all.push_back(points[rank].at(p));
+    try {
+      if (!failure) take(state, of_all);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  };
+  give_order(communicator_, Order::save, {});
+  std::vector<std::string> answers(points.size());
+  const auto take_one_of_each_rank = [&] {
+    bool any = false;
+    for (std::size_t rank = 1; rank < answers.size(); ++rank) {
+      if (!answers[rank].empty()) continue;
+      std::string message = receive(communicator_, static_cast<int>(rank));
+      PacketReader packet(message);
+      if (static_cast<Verdict>(packet.get<std::int32_t>()) == Verdict::more) {
+        const std::vector<std::size_t> of_rank = get_indices(packet);
+        pass_on(rank, packet.get_text(), of_rank);
+        any = true;
+      } else {
+        answers[rank] = std::move(message);
+      }
+    }
+    return any;
+  };
+  try {
+    local_.save_each([&](const std::string& state, std::span<const std::size_t> of_rank) {
+      pass_on(0, state, of_rank);
+      take_one_of_each_rank();
+    });
+  } catch (...) {
+    if (!failure) failure = std::current_exception();
   }
-  return states;
+  while (take_one_of_each_rank()) {
+  }
+  if (failure) std::rethrow_exception(failure);
+  answers.erase(answers.begin());
+  outputs(answers, 1);
 }
 
-void VolumeElements::load(const SavedStates& states) {
-  if (states.size() != size())
-    throw UserError("checkpoint: " + std::to_string(states.size()) + " points saved, " + std::to_string(size()) +
-                    " expected; restart with the case that wrote it");
-  std::vector<std::string> inputs;
-  for (const auto& share : shares_) {
-    PacketWriter packet;
-    for (const std::size_t point : share) packet.put(states[point]);
-    inputs.push_back(packet.take());
+/// A round gives every rank one of the states of its points.
+void VolumeElements::load_each(const StateSource& states) {
+  require_states_of(size(), states);
+  std::vector<std::vector<std::pair<int, std::vector<std::size_t>>>> shares;
+  std::size_t rounds = 0;
+  for (const auto& points : shares_) {
+    StateSource of_rank;
+    for (const std::size_t p : points) of_rank.number_of_point.push_back(states.number_of_point[p]);
+    shares.push_back(of_rank.points_of_states());
+    rounds = std::max(rounds, shares.back().size());
   }
-  command(communicator_, Order::load, inputs, local_);
-  histories_ = EqualHistories(std::span<const std::string>(states));
+  for (std::size_t round = 0; round < rounds; ++round) {
+    std::vector<std::string> inputs;
+    for (const auto& share : shares) {
+      PacketWriter packet;
+      put_indices(packet, round < share.size() ? share[round].second : std::vector<std::size_t>());
+      if (round < share.size()) packet.put(states.read(share[round].first));
+      inputs.push_back(packet.take());
+    }
+    command(communicator_, Order::load, inputs, local_);
+  }
+  histories_ = EqualHistories(std::span<const int>(states.number_of_point));
 }
 
 std::vector<int> VolumeElements::owners() const {
@@ -472,7 +542,7 @@ void serve(MPI_Comm communicator, LocalPoints& local) {
     const std::string message = receive(communicator, 0);
     PacketReader packet(message);
     const auto order = static_cast<Order>(packet.get<std::int32_t>());
-    send(communicator, 0, answer(order, packet.get_text(), local));
+    send(communicator, 0, answer(order, packet.get_text(), local, communicator));
     if (order == Order::end) return;
   }
 }

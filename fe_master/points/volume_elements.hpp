@@ -67,8 +67,9 @@ class VolumeElements : public MaterialPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
   std::vector<PointReport> reports() const override { return reports_; }
-  SavedStates save() override;
-  void load(const SavedStates& states) override;
+  /// Ranks hand over one state after another, rank 0 holds one of each.
+  void save_each(const TakeState& take) override;
+  void load_each(const StateSource& states) override;
 
   /// Directly after save(): shares the points out by what each has cost, where that pays (rebalance); costs since the
   /// last time are the latest, older ones count half each time. The cost is counted (DEM steps x contacts), not

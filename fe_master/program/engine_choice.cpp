@@ -87,6 +87,22 @@ EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std
   return {EngineKind::yade, "engine: YADE; " + objection};
 }
 
+PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vector<VeParameters> pool,
+                        RunOptions& options) {
+  PythonVolumeElements maker(worker, ve_options(ve));
+  for (VeParameters& setup : pool) setup.cache = writable_cache(setup, options.folder);
+  PreparedRun prepared;
+  prepared.states = make_templates(maker, pool, [&](std::string_view line) {
+    std::cout << line << std::endl;
+    options.remarks.emplace_back(line);
+  });
+  options.versions.merge(engine_versions(maker));
+  const EngineVerdict verdict = choose_engine(ve.engine, worker, prepared.states);
+  options.remarks.push_back(verdict.sentence);
+  prepared.engine = verdict.engine;
+  return prepared;
+}
+
 WorkerCommand worker_command(const VeParameters& ve) {
   WorkerCommand command;
   command.sorted_contacts = ve.sorted_contacts;

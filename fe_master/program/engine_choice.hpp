@@ -7,6 +7,7 @@
 
 #include "case.hpp"
 #include "material_points.hpp"
+#include "run_files.hpp"
 #include "ve_state.hpp"
 #include "worker_process.hpp"
 
@@ -23,6 +24,15 @@ struct EngineVerdict {
 /// "compact" is a UserError. The paper's law is one that YADE has not: such a template is compact without a comparison,
 /// and a UserError where another one has to be YADE's. states: of the templates, as make_templates gives them.
 EngineVerdict choose_engine(EngineChoice asked, WorkerProcess& worker, const std::vector<std::string>& states);
+
+/// What a run on volume elements starts from: the states of its pool, and the engine that strains them.
+struct PreparedRun {
+  std::vector<std::string> states;
+  EngineKind engine = EngineKind::yade;
+};
+/// Takes or makes the volume elements of the pool and chooses the engine that `ve` asks for. What there is to say goes to the terminal and to the options' remarks, versions to theirs.
+PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vector<VeParameters> pool,
+                        RunOptions& options);
 
 /// The worker of a rank for these volume elements.
 WorkerCommand worker_command(const VeParameters& ve);

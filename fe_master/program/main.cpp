@@ -4,15 +4,14 @@
 
 #include <CLI/CLI.hpp>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 
 #include "analytic_points.hpp"
 #include "case.hpp"
+#include "end_request.hpp"
+#include "end_signals.hpp"
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
@@ -20,7 +19,6 @@
 #include "time_loop.hpp"
 #include "tools.hpp"
 #include "ve_commands.hpp"
-#include "ve_templates.hpp"
 #include "versions.hpp"
 #include "volume_elements.hpp"
 
@@ -29,19 +27,6 @@ extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
 namespace femxdem {
 namespace {
-
-struct Arguments {
-  std::string case_file;
-  std::string folder;
-  std::vector<std::string> overrides;
-  bool restart = false;
-  bool overwrite = false;
-  std::optional<bool> progress;
-  int noise_samples = 0;
-  int compare = 0;
-  bool markdown = false;
-  std::string command_line;
-};
 
 /// MPI for the life of the program; the worker must have been started before.
 struct Mpi {
@@ -53,6 +38,7 @@ struct Mpi {
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
     MPI_Comm_size(machine, &of_machine);
     MPI_Comm_free(&machine);
+    if (rank > 0) ignore_end_signals();
   }
   ~Mpi() { MPI_Finalize(); }
   Mpi(const Mpi&) = delete;
@@ -77,33 +63,11 @@ void keep_standard_descriptors() {
     if (fcntl(descriptor, F_GETFD) < 0) open("/dev/null", O_RDWR);
 }
 
-/// True on the rank that speaks; known before MPI_Init from Open MPI's environment.
+/// True on the rank that speaks; known before MPI_Init from the environment of Open MPI or of Slurm's srun.
 bool speaks() {
-  const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
-  return rank == nullptr || std::string(rank) == "0";
-}
-
-RunOptions run_options(const Arguments& arguments) {
-  RunOptions options;
-  options.folder = arguments.folder;
-  options.existing = arguments.restart     ? Existing::resume
-                     : arguments.overwrite ? Existing::overwrite
-                                           : Existing::refuse;
-  options.command_line = arguments.command_line;
-  options.progress = arguments.progress;
-  options.versions = library_versions();
-  return options;
-}
-
-RunOptions run_options(const Case& c, const Arguments& arguments) {
-  RunOptions options = run_options(arguments);
-  if (options.folder.empty()) options.folder = c.output.directory;
-  if (options.folder.empty()) options.folder = std::filesystem::path("out") / std::filesystem::path(c.file).stem();
-  return options;
-}
-
-VeArguments ve_arguments(const Arguments& arguments) {
-  return {arguments.case_file, arguments.overrides, run_options(arguments), arguments.compare, arguments.noise_samples};
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
+    if (const char* rank = std::getenv(name)) return std::string(rank) == "0";
+  return true;
 }
 
 /// Trials that a run will ask of its volume elements, about: three evaluations a step.
@@ -125,28 +89,19 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
     serve(MPI_COMM_WORLD, *local_points(static_cast<EngineKind>(*engine)));
     return kDone;
   }
-  Problem::Start start = problem.volume_elements();
-  std::vector<std::string> templates;
-  EngineVerdict verdict;
+  const VePool pool = problem.volume_elements();
+  PreparedRun prepared;
   try {
     options.lock = prepare_output_folder(options.folder, options.existing);
-    for (VeParameters& setup : start.templates) setup.cache = writable_cache(setup, options.folder);
-    PythonVolumeElements maker(worker, ve_options(ve));
-    templates = make_templates(maker, start.templates, [&](std::string_view line) {
-      std::cout << line << std::endl;
-      options.remarks.emplace_back(line);
-    });
-    options.versions.merge(engine_versions(maker));
-    verdict = choose_engine(ve.engine, worker, templates);
+    prepared = prepare_run(worker, ve, pool.templates, options);
   } catch (...) {
     mpi.agree(std::nullopt);
     throw;
   }
-  mpi.agree(static_cast<int>(verdict.engine));
+  mpi.agree(static_cast<int>(prepared.engine));
   options.ranks = mpi.size;
-  options.remarks.push_back(verdict.sentence);
-  const auto local = local_points(verdict.engine);
-  VolumeElements points(MPI_COMM_WORLD, *local, templates, start.template_of_point);
+  const auto local = local_points(prepared.engine);
+  VolumeElements points(MPI_COMM_WORLD, *local, prepared.states, pool.template_of_point);
   if (mpi.size > 1) options.at_checkpoint = [&] { return describe(points.balance(ve.balance), points.size()); };
   options.complete = [&](Summary& summary) {
     const VolumeElements::Account account = points.account();
@@ -160,16 +115,16 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
     summary.moved = statistics.moved;
     summary.peak_memory_workers = account.peak_memory;
     summary.threads = local->threads();
-    summary.engine = name_of(verdict.engine);
+    summary.engine = name_of(prepared.engine);
     summary.engine_check = describe(account.check);
   };
   return run_case(problem, points, options);
 }
 
 int run(const Arguments& arguments) {
-  const Case c = read_case(arguments.case_file, arguments.overrides);
+  const Case c = read_case(arguments.file, arguments.overrides);
   Problem problem(c);
-  const RunOptions options = run_options(c, arguments);
+  const RunOptions options = run_options(arguments, c);
   if (problem.on_volume_elements()) return run_on_volume_elements(problem, options);
   const Mpi mpi;
   if (mpi.rank > 0) return kDone;  // laws in closed form cost nothing: rank 0 alone
@@ -178,11 +133,99 @@ int run(const Arguments& arguments) {
 }
 
 int check(const Arguments& arguments) {
-  const Case c = read_case(arguments.case_file, arguments.overrides);
+  const Case c = read_case(arguments.file, arguments.overrides);
   const Mesh mesh = make_mesh(c.mesh, c.regions);
   std::cout << c.file << ": no mistakes; " << mesh.elements.size() << " elements, "
             << kPointsPerElement * mesh.elements.size() << " material points\n";
   return kDone;
+}
+
+int parameters(const Arguments& arguments) {
+  std::cout << (arguments.markdown ? parameters_markdown() : describe_parameters());
+  return kDone;
+}
+
+struct CommandLine {
+  CLI::App app{"femxdem: finite elements whose material is a volume element of spheres in YADE"};
+  Arguments arguments;
+  int status = kDone;
+};
+
+using Command = int(const Arguments&);
+
+/// A command that runs once the whole line is understood.
+CLI::App* add_command(CommandLine& line, CLI::App& parent, const char* name, const char* text, Command* command) {
+  CLI::App* added = parent.add_subcommand(name, text);
+  added->callback([&line, command] { line.status = command(line.arguments); });
+  return added;
+}
+
+CLI::App* add_case_command(CommandLine& line, CLI::App& parent, const char* name, const char* text, Command* command) {
+  CLI::App* added = add_command(line, parent, name, text, command);
+  added->add_option("case", line.arguments.file, "Case file (TOML)")->required();
+  added->add_option("--set", line.arguments.overrides, "Override a parameter: section.key=value (repeatable)");
+  return added;
+}
+
+void add_progress(CLI::App& command, Arguments& arguments) {
+  command.add_flag_callback(
+      "--progress", [&arguments] { arguments.progress = true; },
+      "One line that updates (default on terminals, but not under mpirun or a scheduler)");
+  command.add_flag_callback(
+      "--no-progress", [&arguments] { arguments.progress = false; }, "A line for each step");
+}
+
+void add_restart(CLI::App& command, Arguments& arguments) {
+  command.add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
+  command.add_option("--time-limit", arguments.time_limit,
+                     "Save and end with status 75 before so much time is over: seconds, MM:SS, HH:MM:SS or "
+                     "D-HH:MM:SS (default: the end of the Slurm job)");
+}
+
+void add_commands(CommandLine& line) {
+  line.app.require_subcommand(0, 1);
+  line.app.add_flag_callback(
+      "--version",
+      [] {
+        std::cout << describe_versions();
+        std::exit(kDone);
+      },
+      "Versions of the program and of what it uses, and what is missing");
+  Arguments& arguments = line.arguments;
+  CLI::App* run_it = add_case_command(line, line.app, "run", "Run a case; also under mpirun -n P", run);
+  run_it->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
+  add_restart(*run_it, arguments);
+  run_it->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(*run_it, arguments);
+  add_case_command(line, line.app, "check", "Say all mistakes of a case file, without running it", check);
+  add_command(line, line.app, "parameters", "Every parameter: unit, default, bounds, text", parameters)
+      ->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
+}
+
+void add_ve_commands(CommandLine& line) {
+  Arguments& arguments = line.arguments;
+  CLI::App& ve = *line.app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect, serve");
+  ve.require_subcommand(1);
+  CLI::App* path = add_case_command(line, ve, "path", "Follow the [[path]] of a case with one material point", ve_path);
+  path->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
+  add_restart(*path, arguments);
+  path->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
+  add_progress(*path, arguments);
+  path->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
+      ->check(CLI::Range(3, 1000));
+  CLI::App* prepare = add_case_command(line, ve, "prepare", "Make the volume elements of a case", ve_prepare);
+  prepare->add_option("--out", arguments.folder, "Folder of the packings (default: ve.cache, else packings)");
+  prepare
+      ->add_option(
+          "--compare", arguments.compare,
+          "Make them anew, each beside so many DEM steps of the scene's own continuation in YADE; the manifest and "
+          "the notes tell the difference")
+      ->check(CLI::Range(1, 1000000));
+  add_case_command(line, ve, "inspect", "Draw a volume element: of a case, or a prepared .state", ve_inspect)
+      ->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
+  add_case_command(line, ve, "serve",
+                   "Answer one strain a line of the standard input, for scripts: femxdem.py (the module femxdem)",
+                   ve_serve);
 }
 
 }  // namespace
@@ -193,88 +236,29 @@ int main(int argc, char** argv) {
   keep_standard_descriptors();
   std::signal(SIGXFSZ, SIG_IGN);                                         // a limit on files' sizes is an error of write
   if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);  // the ranks are the parallelism
-  Arguments arguments;
-  for (int i = 0; i < argc; ++i) arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
-
-  CLI::App app("femxdem: finite elements whose material is a volume element of spheres in YADE");
-  app.require_subcommand(0, 1);
-  app.add_flag_callback(
-      "--version",
-      [] {
-        std::cout << describe_versions();
-        std::exit(kDone);
-      },
-      "Versions of the program and of what it uses, and what is missing");
-  const auto add_case = [&](CLI::App* command) {
-    command->add_option("case", arguments.case_file, "Case file (TOML)")->required();
-    command->add_option("--set", arguments.overrides, "Override a parameter: section.key=value (repeatable)");
-  };
-  const auto add_progress = [&](CLI::App* command) {
-    command->add_flag_callback(
-        "--progress", [&] { arguments.progress = true; },
-        "One line that updates (default on terminals, but not under mpirun or a scheduler)");
-    command->add_flag_callback(
-        "--no-progress", [&] { arguments.progress = false; }, "A line for each step");
-  };
-  CLI::App* run_command = app.add_subcommand("run", "Run a case; also under mpirun -n P");
-  add_case(run_command);
-  run_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME)");
-  run_command->add_flag("--restart", arguments.restart, "Go on from the last checkpoint in that folder");
-  run_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
-  add_progress(run_command);
-  CLI::App* check_command = app.add_subcommand("check", "Say all mistakes of a case file, without running it");
-  add_case(check_command);
-  CLI::App* parameters_command = app.add_subcommand("parameters", "Every parameter: unit, default, bounds, text");
-  parameters_command->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
-
-  CLI::App* ve_command = app.add_subcommand("ve", "A volume element by itself: path, prepare, inspect, serve");
-  ve_command->require_subcommand(1);
-  CLI::App* path_command = ve_command->add_subcommand("path", "Follow the [[path]] of a case with one material point");
-  add_case(path_command);
-  path_command->add_option("--out", arguments.folder, "Folder of the results (default: out/NAME_ve)");
-  path_command->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
-  add_progress(path_command);
-  path_command
-      ->add_option("--noise", arguments.noise_samples, "Probe the stress's jitter in each step with so many strains")
-      ->check(CLI::Range(3, 1000));
-  CLI::App* prepare_command = ve_command->add_subcommand("prepare", "Make the volume elements of a case");
-  add_case(prepare_command);
-  prepare_command->add_option("--out", arguments.folder, "Folder of the packings (default: ve.cache, else packings)");
-  prepare_command
-      ->add_option(
-          "--compare", arguments.compare,
-          "Make them anew, each beside so many DEM steps of the scene's own continuation in YADE; the manifest and "
-          "the notes tell the difference")
-      ->check(CLI::Range(1, 1000000));
-  CLI::App* inspect_command =
-      ve_command->add_subcommand("inspect", "Draw a volume element: of a case, or a prepared .state");
-  add_case(inspect_command);
-  inspect_command->add_option("--out", arguments.folder, "Folder of the figures (default: out/NAME_ve)");
-  CLI::App* serve_command = ve_command->add_subcommand(
-      "serve", "Answer one strain a line of the standard input, for scripts: femxdem.py (the module femxdem)");
-  add_case(serve_command);
-  for (const Tool& tool : tools()) app.add_subcommand(std::string(tool.name), std::string(tool.help));
-
+  CommandLine line;
+  speaks() ? end_at_signals() : ignore_end_signals();
+  for (int i = 0; i < argc; ++i) line.arguments.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
+  add_commands(line);
+  add_ve_commands(line);
+  for (const Tool& tool : tools()) line.app.add_subcommand(std::string(tool.name), std::string(tool.help));
   try {
     if (const Tool* tool = argc > 1 ? find_tool(argv[1]) : nullptr) become(*tool, {argv + 2, argv + argc});
-    app.parse(argc, argv);
-    if (*run_command) return run(arguments);
-    if (*check_command) return check(arguments);
-    if (*path_command) return ve_path(ve_arguments(arguments));
-    if (*prepare_command) return ve_prepare(ve_arguments(arguments));
-    if (*serve_command) return ve_serve(ve_arguments(arguments));
-    if (*inspect_command) return ve_inspect(ve_arguments(arguments));
-    if (*parameters_command) std::cout << (arguments.markdown ? parameters_markdown() : describe_parameters());
-    if (app.get_subcommands().empty()) std::cout << app.help();
-    return kDone;
+    line.app.parse(argc, argv);
+    if (line.app.get_subcommands().empty()) std::cout << line.app.help();
+    return line.status;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kBadInput;
+    return line.app.exit(error) == 0 ? kDone : kBadInput;
   } catch (const UserError& error) {
     if (speaks()) std::cerr << error.what() << "\n";
     return kBadInput;
   } catch (const DiskError& error) {
     std::cerr << error.what() << "\n";
     return kNotWritten;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "femxdem: the system gives no more memory; use fewer ranks on this machine, or raise its limit (ulimit -v), and "
+                 "--restart from the last checkpoint\n";
+    return kPointFailed;
   } catch (const std::exception& error) {
     std::cerr << "femxdem: " << error.what() << "\n";
     return kPointFailed;

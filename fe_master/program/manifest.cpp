@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
+
+#include "output_folder.hpp"
 
 namespace femxdem {
 namespace {
@@ -64,12 +64,6 @@ std::size_t value_of(std::string_view json, std::string_view key) {
   const std::string quoted = fmt::format("\"{}\":", key);
   const std::size_t found = json.find(quoted);
   return found == std::string_view::npos ? found : json.find_first_not_of(" \n", found + quoted.size());
-}
-
-std::string read_file(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ namespace femxdem {
 namespace {
 
 constexpr auto kTools = std::to_array<Tool>({
+    {"advise", "advise.py", "Advice before a run, from short probes of its volume element"},
     {"report", "report.py", "One HTML page of a run: curve, maps, band, convergence, engine check, versions, case"},
     {"plot", "plot.py", "Figures of a run: curve, maps on the deformed mesh, cost of the steps"},
     {"band", "band.py", "Thickness and inclination of a shear band"},

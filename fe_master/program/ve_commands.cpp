@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "end_request.hpp"
 #include "engine_choice.hpp"
 #include "errors.hpp"
 #include "locations.hpp"
@@ -14,6 +15,7 @@
 #include "tools.hpp"
 #include "ve_service.hpp"
 #include "ve_templates.hpp"
+#include "versions.hpp"
 
 namespace femxdem {
 namespace {
@@ -43,13 +45,6 @@ VeParameters single_ve(const Case& c) {
   return ve;
 }
 
-fs::path default_folder(const Case& c, const char* ending) {
-  fs::path folder = c.output.directory;
-  if (folder.empty()) folder = fs::path("out") / fs::path(c.file).stem();
-  folder += ending;
-  return folder;
-}
-
 /// Trials that a path will ask of its volume element, about.
 double expected_trials(const Case& c) {
   double increments = 0;
@@ -57,41 +52,30 @@ double expected_trials(const Case& c) {
   return 3 * increments;
 }
 
-/// Makes the volume element of a case and calls `use` with it; what its making says and decides goes into
-/// arguments.options.
+/// Makes the volume element of a case and calls `use` with it; what its making says and decides goes into the options.
 template <class Use>
-int with_volume_element(const Case& c, VeArguments& arguments, double trials, Use use) {
+int with_volume_element(const Case& c, RunOptions& options, double trials, Use use) {
   WorkerProcess worker(worker_command(c.ve));
-  PythonVolumeElements maker(worker, ve_options(c.ve));
-  VeParameters ve = single_ve(c);
-  ve.cache = writable_cache(ve, arguments.options.folder);
-  const std::string state = make_templates(maker, {ve}, [&](std::string_view line) {
-                              say(line);
-                              arguments.options.remarks.emplace_back(line);
-                            }).front();
-  arguments.options.versions.merge(engine_versions(maker));
-  const EngineVerdict verdict = choose_engine(c.ve.engine, worker, {state});
-  arguments.options.remarks.push_back(verdict.sentence);
-  const auto point = make_local_points(verdict.engine, worker, c.ve, trials, arguments.options.folder, 1);
-  arguments.options.complete = [&](Summary& summary) {
+  const PreparedRun prepared = prepare_run(worker, c.ve, {single_ve(c)}, options);
+  const auto point = make_local_points(prepared.engine, worker, c.ve, trials, options.folder, 1);
+  options.complete = [&](Summary& summary) {
     summary.peak_memory_workers = point->peak_memory();
     summary.threads = point->threads();
-    summary.engine = name_of(verdict.engine);
+    summary.engine = name_of(prepared.engine);
     summary.engine_check = describe(point->engine_check());
   };
-  point->add(state, 1);
+  point->add(prepared.states.front(), 1);
   return use(*point);
 }
 
-int path_of_volume_element(const Case& c, VeArguments& arguments) {
-  arguments.options.lock = prepare_output_folder(arguments.options.folder, arguments.options.existing);
-  return with_volume_element(c, arguments, expected_trials(c), [&](LocalPoints& point) {
-    return follow_path(c, point, arguments.options, arguments.noise_samples);
-  });
+int path_of_volume_element(const Case& c, RunOptions options, int noise_samples) {
+  options.lock = prepare_output_folder(options.folder, options.existing);
+  return with_volume_element(c, options, expected_trials(c),
+                             [&](LocalPoints& point) { return follow_path(c, point, options, noise_samples); });
 }
 
 /// All volume elements of a case: those of its mesh, or of its seeds where it has none.
-std::vector<VeParameters> pool_of(const VeArguments& arguments) {
+std::vector<VeParameters> pool_of(const Arguments& arguments) {
   const Case c = read_path_case(arguments.file, arguments.overrides);
   refuse_closed_form(c);
   if (!c.loads.empty()) {
@@ -107,21 +91,47 @@ std::vector<VeParameters> pool_of(const VeArguments& arguments) {
   return pool;
 }
 
-}  // namespace
-
-int ve_path(VeArguments arguments) {
-  refuse_ranks();
-  const Case c = read_path_case(arguments.file, arguments.overrides);
-  if (arguments.options.folder.empty()) arguments.options.folder = default_folder(c, "_ve");
-  if (c.material.type == MaterialType::volume_element) return path_of_volume_element(c, arguments);
-  return follow_path(c, *make_analytic_point(c), arguments.options, arguments.noise_samples);
+/// By when this process must have ended: --time-limit, counted from its start, or the end of the scheduler's job.
+std::optional<Moment> ends_before(const Arguments& arguments) {
+  if (arguments.time_limit.empty()) return end_of_job();
+  const std::chrono::duration<double> limit(seconds_of(arguments.time_limit));
+  return arguments.start + std::chrono::duration_cast<Moment::duration>(limit);
 }
 
-int ve_prepare(const VeArguments& arguments) {
+}  // namespace
+
+RunOptions run_options(const Arguments& arguments, const Case& c, const char* ending) {
+  RunOptions options;
+  options.folder = arguments.folder;
+  if (options.folder.empty()) {
+    options.folder = c.output.directory;
+    if (options.folder.empty()) options.folder = fs::path("out") / fs::path(c.file).stem();
+    options.folder += ending;
+  }
+  options.existing = arguments.restart     ? Existing::resume
+                     : arguments.overwrite ? Existing::overwrite
+                                           : Existing::refuse;
+  options.command_line = arguments.command_line;
+  options.progress = arguments.progress;
+  options.versions = library_versions();
+  options.ends_before = ends_before(arguments);
+  return options;
+}
+
+int ve_path(const Arguments& arguments) {
+  refuse_ranks();
+  const Case c = read_path_case(arguments.file, arguments.overrides);
+  const RunOptions options = run_options(arguments, c, "_ve");
+  if (c.material.type == MaterialType::volume_element)
+    return path_of_volume_element(c, options, arguments.noise_samples);
+  return follow_path(c, *make_analytic_point(c), options, arguments.noise_samples);
+}
+
+int ve_prepare(const Arguments& arguments) {
   refuse_ranks();
   std::vector<VeParameters> pool = pool_of(arguments);
-  if (!arguments.options.folder.empty())
-    for (VeParameters& ve : pool) ve.cache = arguments.options.folder.string();
+  if (!arguments.folder.empty())
+    for (VeParameters& ve : pool) ve.cache = arguments.folder;
   WorkerProcess worker({});
   PythonVolumeElements elements(worker, ve_options(pool.front()));
   make_templates(elements, pool, say, arguments.compare);
@@ -130,24 +140,25 @@ int ve_prepare(const VeArguments& arguments) {
   return kDone;
 }
 
-int ve_serve(VeArguments arguments) {
+int ve_serve(const Arguments& arguments) {
   refuse_ranks();
   const Case c = read_path_case(arguments.file, arguments.overrides);
   refuse_closed_form(c);
-  arguments.options.folder = fs::temp_directory_path();  // for packings where nothing else can be written
-  return with_volume_element(c, arguments, kServedTrials, [&](LocalPoints& point) {
+  RunOptions options = run_options(arguments, c);
+  options.folder = fs::temp_directory_path();  // for packings where nothing else can be written
+  return with_volume_element(c, options, kServedTrials, [&](LocalPoints& point) {
     serve_volume_element(point, std::cin, std::cout);
     return kDone;
   });
 }
 
-int ve_inspect(const VeArguments& arguments) {
+int ve_inspect(const Arguments& arguments) {
   refuse_ranks();
-  fs::path state = arguments.file, folder = arguments.options.folder;
+  fs::path state = arguments.file, folder = arguments.folder;
   if (state.extension() == ".toml") {
     const Case c = read_path_case(arguments.file, arguments.overrides);
     refuse_closed_form(c);
-    if (folder.empty()) folder = default_folder(c, "_ve");
+    folder = run_options(arguments, c, "_ve").folder;
     WorkerProcess worker({});
     PythonVolumeElements elements(worker, ve_options(c.ve));
     VeParameters ve = single_ve(c);

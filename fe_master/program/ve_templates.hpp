@@ -20,7 +20,7 @@ struct TemplateFiles {
 TemplateFiles template_files(PythonVolumeElements& elements, const VeParameters& ve);
 
 /// Names and texts of the scripts that decide what a volume element is prepared to: all of the folder, so that none is
-/// forgotten, but the contract with its dummy and the drawing of what has been prepared. A change in one of them, even
+/// forgotten, but the contract and the drawing of what has been prepared. A change in one of them, even
 /// where it decides nothing, costs a preparation.
 std::string makers(const std::filesystem::path& scripts);
 

@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "analytic_points.hpp"
+#include "checkpoint.hpp"
+#include "end_request.hpp"
 #include "errors.hpp"
-#include "nonlinear_solver.hpp"
 #include "path_driver.hpp"
+#include "problem.hpp"
+#include "restart.hpp"
 #include "step_size.hpp"
 
 namespace femxdem {
@@ -46,13 +50,6 @@ std::vector<double> values(const Tensor2& F, const Response& response) {
   return row;
 }
 
-SolverParameters parameters_of(const Case& c) {
-  const bool on_volume_element = c.material.type == MaterialType::volume_element;
-  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_element);
-  if (on_volume_element) parameters.answer_at = answer_at(c.ve);
-  return parameters;
-}
-
 /// The steps along the segments and the files that they fill.
 class Path {
  public:
@@ -60,11 +57,16 @@ class Path {
   int go();
 
  private:
-  bool segment(std::size_t number);
+  enum class End { done, failed, told_to };
+  End segment(std::size_t number);
+  void resume();
+  bool told_to_end();
+  void save(std::size_t segment, double done, double size);
   bool step(double fraction, double segments_before);
   void record_row();
 
   const Case& case_;
+  MaterialPoints& point_;
   const RunOptions& options_;
   int noise_samples_;
   SolverParameters parameters_;
@@ -73,25 +75,42 @@ class Path {
   StepRecord record_;  // of the step under way, rejected attempts included
   PathStep last_;
   double last_noise_ = 0, largest_noise_ = 0;
+  EndRequest end_request_;
+  std::string end_reason_;
+  std::optional<Checkpoint> resumed_;  // until its segment is taken up
 };
 
 Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples)
     : case_(c),
+      point_(point),
       options_(options),
       noise_samples_(noise_samples),
-      parameters_(parameters_of(c)),
+      parameters_(solver_parameters(c)),
       driver_(point, parameters_),
-      files_(c, options) {
-  files_.begin_history(columns(noise_samples > 0));
+      files_(c, options),
+      end_request_(options.ends_before) {
+  if (options.existing == Existing::resume) {
+    const std::filesystem::path place = options.folder / "checkpoint.h5";
+    const CheckpointFile file(place);
+    resumed_ = file.read(options.versions);
+    refuse_other_case(place, *resumed_, c);
+    point.load_each(file.states());
+  }
+  files_.begin_history(columns(noise_samples > 0), resumed_ ? resumed_->step : 0);
 }
 
 int Path::go() {
   files_.log.say(fmt::format("{}: one material point, {} segment{}", case_.file, case_.path.size(),
                              case_.path.size() > 1 ? "s" : ""));
-  record_row();
+  resumed_ ? resume() : record_row();
   try {
-    for (std::size_t s = 0; s < case_.path.size(); ++s) {
-      if (segment(s)) continue;
+    for (auto s = resumed_ ? static_cast<std::size_t>(resumed_->time) : 0; s < case_.path.size(); ++s) {
+      const End end = segment(s);
+      if (end == End::done) continue;
+      if (end == End::told_to)
+        return files_.finish(
+            kRunAgain, fmt::format("{}: stopped and saved after step {} in {}; run again with --restart", end_reason_,
+                                   files_.summary.steps, options_.folder.string()));
       return files_.finish(
           last_.failure ? kPointFailed : kNotConverged,
           fmt::format("stopped after step {}, {:.3g} % along segment {}, all steps up to it are in {}: {}",
@@ -114,13 +133,49 @@ int Path::go() {
       kDone, fmt::format("{} steps, {} evaluations{}", files_.summary.steps, files_.summary.evaluations, noise));
 }
 
-/// Increments of one segment, cut where they fail; false when the smallest one fails too.
-bool Path::segment(std::size_t number) {
+void Path::resume() {
+  files_.summary.steps = resumed_->step;
+  files_.summary.evaluations = static_cast<long>(find_array(resumed_->arrays, "run.counts").at(0));
+  files_.summary.dem_steps = find_array(resumed_->arrays, "run.counts").at(1);
+  files_.log.start_from(resumed_->time / static_cast<double>(case_.path.size()));
+  files_.log.say(fmt::format("restart after step {}", resumed_->step));
+}
+
+bool Path::told_to_end() {
+  constexpr double kNeeded = 5;  // for a step and the checkpoint [s]
+  end_reason_ = end_request_.reason(kNeeded).value_or("");
+  return !end_reason_.empty();
+}
+
+/// time: the number of the segment.
+void Path::save(std::size_t segment, double done, double size) {
+  Checkpoint checkpoint{files_.summary.steps, static_cast<double>(segment), size, {}, comparable_toml(case_),
+                        options_.versions};
+  driver_.save(checkpoint.arrays);
+  checkpoint.arrays.emplace_back("path.done", std::vector<double>{done});
+  checkpoint.arrays.emplace_back(
+      "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
+  write_checkpoint(options_.folder / "checkpoint.h5", checkpoint, point_);
+}
+
+/// Increments of one segment, cut where they fail, until the smallest one fails too or it is told to end.
+Path::End Path::segment(std::size_t number) {
   const double increment = 1.0 / case_.path[number].increments;
   StepSize size({increment, kSmallestFraction * increment, increment, case_.control.growth, case_.control.cut}, 1);
   double done = 0;
-  driver_.begin_segment(case_.path[number]);
+  if (resumed_) {
+    done = find_array(resumed_->arrays, "path.done").at(0);
+    size.set_size(resumed_->dt);
+    driver_.load(resumed_->arrays, case_.path[number]);
+    resumed_.reset();
+  } else {
+    driver_.begin_segment(case_.path[number]);
+  }
   while (!size.done(done)) {
+    if (record_.evaluations == 0 && told_to_end()) {
+      save(number, done, size.size());
+      return End::told_to;
+    }
     const double next = done + size.next(done);
     if (step(next, static_cast<double>(number))) {
       done = next;
@@ -130,9 +185,9 @@ bool Path::segment(std::size_t number) {
     size.rejected();
     files_.log.say(fmt::format("step {} rejected: {}", files_.summary.steps + 1, last_.reason));
     record_.time = static_cast<double>(number) + done;
-    if (size.exhausted()) return false;
+    if (size.exhausted()) return End::failed;
   }
-  return true;
+  return End::done;
 }
 
 /// A step to `fraction` of a segment; its row is of the moment that the answer belongs to.

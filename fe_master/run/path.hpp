@@ -26,7 +26,7 @@ std::unique_ptr<MaterialPoints> make_analytic_point(const Case& c);
 /// Columns beside those of a run: strain_* (ln V, F = V R), stress_* (Cauchy [Pa], tension positive), F_11 .. F_33,
 /// the point's report, and stress_noise (PathDriver::noise over noise_samples strains within solver.qn_noise) when
 /// noise_samples > 0; time counts segments; row 0 is the start. Steps are cut and grown within the segment's increment.
-/// Returns the exit status.
+/// Told to end it saves between two steps, as a run does. Returns the exit status.
 int follow_path(const Case& c, MaterialPoints& point, const RunOptions& options, int noise_samples = 0);
 
 }  // namespace femxdem

@@ -243,4 +243,33 @@ void PathDriver::commit() {
   response_ = trial_;
 }
 
+/// visit(numbers, how many) for all of the committed state.
+template <class Driver, class Visit>
+void PathDriver::visit_state(Driver& driver, Visit visit) {
+  for (auto* number : {&driver.fraction_, &driver.end_, &driver.last_fraction_}) visit(number, 1);
+  for (auto* T : {&driver.R_, &driver.F_start_, &driver.F_, &driver.F_end_, &driver.response_.stress})
+    visit(T->data(), 9);
+  for (auto* v : {&driver.E_start_, &driver.stress_start_, &driver.last_E_change_}) visit(v->data(), 6);
+  visit(driver.response_.stiffness.data(), 81);
+  visit(driver.response_.report.values.data(), driver.response_.report.values.size());
+}
+
+void PathDriver::save(NamedArrays& arrays) const {
+  std::vector<double> values;
+  visit_state(*this,
+              [&](const double* numbers, std::size_t count) { values.insert(values.end(), numbers, numbers + count); });
+  tangent_->save(values);
+  arrays.emplace_back("path.state", std::move(values));
+}
+
+void PathDriver::load(const NamedArrays& arrays, const PathSegment& segment) {
+  const std::vector<double>& values = find_array(arrays, "path.state");
+  std::size_t position = 0;
+  visit_state(*this, [&](double* numbers, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) numbers[i] = values.at(position++);
+  });
+  tangent_->load(values, position);
+  segment_ = segment;
+}
+
 }  // namespace femxdem

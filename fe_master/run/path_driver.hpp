@@ -9,6 +9,7 @@
 #include "learned_tangent.hpp"
 #include "material_points.hpp"
 #include "mid_step_points.hpp"
+#include "named_arrays.hpp"
 
 namespace femxdem {
 
@@ -48,7 +49,7 @@ struct PathStep {
 /// NonlinearSolver says.
 class PathDriver {
  public:
-  /// point.size() is 1. Tolerances must be given, see with_default_tolerances.
+  /// point.size() is 1. Tolerances must be given, see solver_parameters.
   /// Throws UserError when the undeformed point fails.
   PathDriver(MaterialPoints& point, const SolverParameters& parameters);
 
@@ -61,6 +62,10 @@ class PathDriver {
   double noise(double amplitude, int samples);
   /// Adopts the converged trial.
   void commit();
+
+  /// What the next solve() depends on but for the point: the committed state within `segment`.
+  void save(NamedArrays& arrays) const;
+  void load(const NamedArrays& arrays, const PathSegment& segment);
 
   /// The last equilibrium: where the answer belongs in the last committed step, or the start of the segment.
   const Tensor2& F() const { return F_; }
@@ -82,6 +87,8 @@ class PathDriver {
   PathVector correction(const PathVector& E, const Tensor2& stress, const PathVector& missing,
                         const PathVector& given) const;
   bool evaluate(const Tensor2& F, PathStep& step);
+  template <class Driver, class Visit>
+  static void visit_state(Driver& driver, Visit visit);
 
   MidStepPoints point_;
   SolverParameters parameters_;

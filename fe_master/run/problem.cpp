@@ -21,19 +21,19 @@ std::vector<AnalyticLaw> Problem::laws() const {
   return laws;
 }
 
-Problem::Start Problem::volume_elements() const {
-  VePool pool = ve_pool(case_, mesh_);
-  Start start{std::move(pool.templates), {}};
-  for (const int t : pool.template_of_element)
-    start.template_of_point.insert(start.template_of_point.end(), kPointsPerElement, t);
-  return start;
+NonlinearSolver& Problem::start(MaterialPoints& points) {
+  solver_.emplace(*formulation_, points, loads_, solver_parameters(case_));
+  return *solver_;
 }
 
-NonlinearSolver& Problem::start(MaterialPoints& points) {
-  SolverParameters parameters = with_default_tolerances(case_.solver, on_volume_elements());
-  if (on_volume_elements()) parameters.answer_at = answer_at(case_.ve);
-  solver_.emplace(*formulation_, points, loads_, parameters);
-  return *solver_;
+SolverParameters solver_parameters(const Case& c) {
+  const bool on_volume_elements = c.material.type == MaterialType::volume_element;
+  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_elements);
+  if (!on_volume_elements) return parameters;
+  parameters.answer_at = answer_at(c.ve);
+  if (!is_given(parameters.qn_first)) parameters.qn_first = 0.5;  // their stress follows the rate of strain too
+  if (!is_given(parameters.qn_scatter)) parameters.qn_scatter = 0.1;
+  return parameters;
 }
 
 }  // namespace femxdem

@@ -33,11 +33,7 @@ class Problem {
   /// Laws in closed form of all points.
   std::vector<AnalyticLaw> laws() const;
   /// Volume elements to prepare, and which of them each point starts from.
-  struct Start {
-    std::vector<VeParameters> templates;
-    std::vector<int> template_of_point;
-  };
-  Start volume_elements() const;
+  VePool volume_elements() const { return ve_pool(case_, mesh_); }
 
   /// The solver at the undeformed state of the points, which are kept by reference. Throws UserError when a point
   /// cannot answer it.
@@ -52,5 +48,8 @@ class Problem {
   Loads loads_;
   std::optional<NonlinearSolver> solver_;
 };
+
+/// [solver] with the defaults that depend on the material, and what the points' answers belong to.
+SolverParameters solver_parameters(const Case& c);
 
 }  // namespace femxdem

@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "errors.hpp"
-#include "hdf5_file.hpp"
 
 namespace femxdem {
 namespace {
@@ -65,45 +64,27 @@ int load_until_the_end(const Case& c) {
 
 }  // namespace
 
-std::string differing_keys(const std::string& theirs, const std::string& ours) {
-  const Parameters then = parameters(theirs), now = parameters(ours);
-  std::string text;
-  for (const std::string& key : differing(then, now)) text += (text.empty() ? "" : ", ") + describe(key, then, now);
-  return text;
-}
-
-std::string hash_of_restart(const std::filesystem::path& checkpoint, const Case& c) {
-  if (!std::filesystem::exists(checkpoint)) return case_hash(c);
-  std::string theirs, text;
-  double time = 0;
-  try {
-    const Hdf5File h5(checkpoint, Hdf5File::Mode::read);
-    theirs = h5.text("/", "case_hash");
-    time = h5.number("/", "time");
-    if (h5.exists("/case")) text = h5.read_bytes("/case");
-  } catch (const Hdf5Error&) {
-    return case_hash(c);  // read_checkpoint says what is wrong with it
-  }
-  const std::string ours = comparable_toml(c);
-  if (theirs == case_hash(c) || text.empty()) return case_hash(c);
-  const std::set<std::string> keys = differing(parameters(text), parameters(ours));
-  const std::string where = checkpoint.string();
+void refuse_other_case(const std::filesystem::path& file, const Checkpoint& checkpoint, const Case& c) {
+  const Parameters then = parameters(checkpoint.case_text), now = parameters(comparable_toml(c));
+  const std::set<std::string> keys = differing(then, now);
+  if (keys.empty()) return;
+  std::string differences;
+  for (const std::string& key : keys) differences += (differences.empty() ? "" : ", ") + describe(key, then, now);
+  const std::string where = file.string();
   if (keys != std::set<std::string>{"control.end_time"})
     throw UserError(
         fmt::format("{}: belongs to another case, which differs in {}; restart with the case it was written by or "
                     "choose another --out",
-                    where, differing_keys(text, ours)));
+                    where, differences));
   if (const int load = load_until_the_end(c); load >= 0)
     throw UserError(
         fmt::format("{}: the case differs in {}, and load.{} depends on it (its factor is time / end_time): give that "
-                    "load a table or a "
-                    "velocity from the start, or restart with the old end",
-                    where, differing_keys(text, ours), load));
-  if (c.control.end_time < time)
+                    "load a table or a velocity from the start, or restart with the old end",
+                    where, differences, load));
+  if (c.control.end_time < checkpoint.time)
     throw UserError(
         fmt::format("{}: was written at time {:g}, beyond the new control.end_time = {:g}; give a later one", where,
-                    time, c.control.end_time));
-  return theirs;
+                    checkpoint.time, c.control.end_time));
 }
 
 }  // namespace femxdem

@@ -1,17 +1,14 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 
 #include "case.hpp"
+#include "checkpoint.hpp"
 
 namespace femxdem {
 
-/// The hash that the checkpoint of a run must have for this case to go on from it: the checkpoint's own where the cases
-/// differ by nothing but a control.end_time on which no load depends. Throws UserError that names the keys that differ.
-std::string hash_of_restart(const std::filesystem::path& checkpoint, const Case& c);
-
-/// The parameters by which two texts of comparable_toml differ, one `key (theirs, now ours)` after another.
-std::string differing_keys(const std::string& theirs, const std::string& ours);
+/// Throws UserError that names the keys that differ where this case cannot go on from what `file` holds: where it
+/// differs from the case that wrote it by more than a control.end_time on which no load depends.
+void refuse_other_case(const std::filesystem::path& file, const Checkpoint& checkpoint, const Case& c);
 
 }  // namespace femxdem

@@ -28,17 +28,17 @@ void RunFiles::add(const StepRecord& record) {
   summary.engine_seconds += record.dem_seconds;
 }
 
-void RunFiles::whole(int last_checkpoint) {
+void RunFiles::whole(double time) {
   whole_step_ = summary.steps;
-  last_checkpoint_ = last_checkpoint;
+  whole_time_ = time;
 }
 
-std::string RunFiles::stopped_by_the_disk(const std::string& reason, double time) {
-  const std::string state = last_checkpoint_ > 0
-                                ? fmt::format("--restart goes on from the checkpoint after step {}", last_checkpoint_)
+std::string RunFiles::stopped_by_the_disk(const std::string& reason) {
+  const std::string state = last_checkpoint_
+                                ? fmt::format("--restart goes on from the checkpoint after step {}", *last_checkpoint_)
                                 : "there is no checkpoint to restart from";
   const std::string message = fmt::format("{}; the last whole step is {} (time {:g}), {}; make room and start again",
-                                          reason, whole_step_, time, state);
+                                          reason, whole_step_, whole_time_, state);
   try {
     finish(kNotWritten, message);
   } catch (const DiskError&) {  // the same disk
@@ -47,7 +47,10 @@ std::string RunFiles::stopped_by_the_disk(const std::string& reason, double time
 }
 
 int RunFiles::finish(int status, const std::string& message) {
-  summary.status = status == kDone ? "done" : status == kNotConverged ? "not converged" : "failed";
+  summary.status = status == kDone           ? "done"
+                   : status == kNotConverged ? "not converged"
+                   : status == kRunAgain     ? "stopped"
+                                             : "failed";
   summary.message = message;
   summary.exit_status = status;
   summary.wall_seconds = wall();

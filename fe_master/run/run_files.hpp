@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "case.hpp"
+#include "end_request.hpp"
 #include "errors.hpp"
 #include "history.hpp"
 #include "log.hpp"
@@ -25,9 +26,10 @@ struct RunOptions {
   int ranks = 1;
   std::string command_line;
   std::map<std::string, std::string> versions;
-  std::vector<std::string> remarks;  ///< for log.txt: the engine; what was adopted, dropped, reset
-  std::shared_ptr<FolderLock> lock;  ///< of the folder where it is prepared already
-  std::optional<bool> progress;      ///< see Log
+  std::vector<std::string> remarks;   ///< for log.txt: the engine; what was adopted, dropped, reset
+  std::shared_ptr<FolderLock> lock;   ///< of the folder where it is prepared already
+  std::optional<Moment> ends_before;  ///< the process must have ended by then
+  std::optional<bool> progress;       ///< see Log
   /// After a checkpoint: shares the points out anew; returns what the log says of it, mostly nothing.
   std::function<std::string()> at_checkpoint = [] { return std::string(); };
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
@@ -50,9 +52,13 @@ class RunFiles {
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
   /// What a full disk leaves: how the run ended, if it still finds a place. Returns the sentence.
-  std::string stopped_by_the_disk(const std::string& reason, double time);
-  /// Every file has what it should of the last step; last_checkpoint: the step of the one on the disk, 0: none.
-  void whole(int last_checkpoint);
+  std::string stopped_by_the_disk(const std::string& reason);
+  /// Every file has what it should of the last step, which ended at `time`.
+  void whole(double time);
+  /// There is a checkpoint of the last step on the disk.
+  void checkpoint_written() { last_checkpoint_ = summary.steps; }
+  /// Its step; nothing where there is none.
+  std::optional<int> last_checkpoint() const { return last_checkpoint_; }
 
  private:
   std::shared_ptr<FolderLock> lock_;  // before any file in the folder
@@ -65,7 +71,9 @@ class RunFiles {
   const RunOptions& options_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::optional<History> history_;
-  int whole_step_ = 0, last_checkpoint_ = 0;
+  int whole_step_ = 0;
+  std::optional<int> last_checkpoint_;
+  double whole_time_ = 0;
 };
 
 }  // namespace femxdem

@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <optional>
+
 #include "checkpoint.hpp"
 #include "field_output.hpp"
 #include "monitors.hpp"
@@ -15,7 +20,8 @@ namespace {
 /// The time loop of one run and the files that it fills.
 class TimeLoop {
  public:
-  TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed);
+  TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed,
+           std::unique_ptr<CheckpointFile> file);
   int go();
 
  private:
@@ -26,7 +32,12 @@ class TimeLoop {
   void accept(Equilibrium start, const std::vector<IterationRecord>& table);
   void restart();
   void write_fields();
+  void keep_state();
   void write_state();
+  bool checkpoint_due() const;
+  double needed_to_end() const;
+  bool told_to_end();
+  std::string stopped();
   std::string place(std::size_t point) const;
   bool reuses() const { return case_.solver.reuse_below > 0; }
   std::vector<std::string> columns() const;
@@ -37,6 +48,7 @@ class TimeLoop {
   const RunOptions& options_;
   MaterialPoints& points_;
   Checkpoint resumed_;
+  std::unique_ptr<CheckpointFile> resumed_file_;
   RunFiles files_;
   NonlinearSolver& solver_;
   StepControl control_;
@@ -49,24 +61,33 @@ class TimeLoop {
     long answers = 0;
     double error = 0;  // largest that was accepted
   } reuse_, reuse_of_step_;
-  int last_checkpoint_ = 0;  // step of the one on the disk, 0: none
-  double whole_time_ = 0;    // of the last step of which every file has what it should
+  EndRequest end_request_;
+  std::string end_reason_;  // why it is to end now
+  Checkpoint state_;        // of the last converged step, without that of the points
+  Moment last_saved_ = Moment::clock::now();
+  double checkpoint_seconds_ = 0, longest_evaluation_ = 0;  // wall time
 };
 
-TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed)
+TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed,
+                   std::unique_ptr<CheckpointFile> file)
     : problem_(problem),
       case_(problem.parameters()),
       options_(options),
       points_(points),
       resumed_(std::move(resumed)),
+      resumed_file_(std::move(file)),
       files_(case_, options),
       solver_(problem.start(points)),
       control_(case_.control, problem.formulation()),
       results_(options.folder, problem.mesh(), point_positions(problem.formulation()), options.existing, resumed_.step),
       size_(
           {case_.control.step, case_.control.min_step, case_.control.max_step, case_.control.growth, case_.control.cut},
-          case_.control.end_time) {
+          case_.control.end_time),
+      end_request_(options.ends_before) {
+  solver_.stop_when([this] { return told_to_end(); });
   files_.begin_history(columns(), resumed_.step);
+  state_.versions = options_.versions;
+  state_.case_text = comparable_toml(case_);
 }
 
 int TimeLoop::go() {
@@ -80,17 +101,24 @@ int TimeLoop::go() {
   } else {
     files_.log.say(fmt::format("start: out-of-balance force {:.1e} of the loads", solver_.relative_residual(before_)));
   }
+  if (const auto left = end_request_.seconds_left())
+    files_.log.say(
+        fmt::format("time limit: saves and ends with status {} within {}", +kRunAgain, readable_duration(*left)));
   try {
-    if (options_.existing != Existing::resume) write_fields();
+    if (options_.existing != Existing::resume) {
+      write_fields();
+      keep_state();
+    }
     const int status = advance();
     const double time = solver_.time();
     const std::string message =
-        status == kDone ? fmt::format("{} steps to time {:g}{}", files_.summary.steps, time, reuse_account())
-                        : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
-                                      files_.summary.steps, time, options_.folder.string(), last_.reason);
+        status == kDone       ? fmt::format("{} steps to time {:g}{}", files_.summary.steps, time, reuse_account())
+        : status == kRunAgain ? stopped()
+                              : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
+                                            files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
-    throw DiskError(files_.stopped_by_the_disk(error.what(), whole_time_));
+    throw DiskError(files_.stopped_by_the_disk(error.what()));
   } catch (const std::exception& error) {
     files_.finish(kPointFailed, error.what());
     throw;
@@ -101,6 +129,7 @@ int TimeLoop::advance() {
   int status = kDone;
   while (status == kDone && !size_.done(solver_.time())) {
     step();
+    if (last_.stopped) return kRunAgain;
     if (!last_.converged && size_.exhausted()) status = last_.failure ? kPointFailed : kNotConverged;
   }
   if (files_.summary.steps % case_.output.every != 0) write_fields();
@@ -113,7 +142,9 @@ void TimeLoop::step() {
   const double begin = solver_.time(), dt = size_.next(begin);
   last_ = solver_.solve_step(dt, control_.target(start, solver_.span(dt)));
   const std::vector<IterationRecord> table = note_attempt(last_);
-  if (last_.converged) {
+  if (last_.stopped) {
+    record_ = {};
+  } else if (last_.converged) {
     accept(std::move(start), table);
   } else {
     reject(begin + dt, table);
@@ -128,6 +159,7 @@ std::vector<IterationRecord> TimeLoop::note_attempt(const StepResult& result) {
   for (const Iteration& i : result.table) {
     record_.dem_seconds += i.engine_seconds;
     files_.summary.evaluate_seconds += i.evaluate_seconds;
+    longest_evaluation_ = std::max(longest_evaluation_, i.evaluate_seconds);
     table.push_back({static_cast<int>(table.size()) + 1, i.residual, i.correction, i.longest_point,
                      i.engine_seconds / static_cast<double>(points_.size()), i.solve_seconds, i.element, i.note});
   }
@@ -178,10 +210,11 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_ = {};
   reuse_of_step_ = {};
   if (files_.summary.steps % case_.output.every == 0) write_fields();
-  const int checkpoint_every = case_.output.checkpoint_every;
-  if (checkpoint_every > 0 && files_.summary.steps % checkpoint_every == 0) write_state();
-  files_.whole(last_checkpoint_);
-  whole_time_ = now.time;
+  keep_state();
+  if (!checkpoint_due()) return;
+  write_state();
+  if (const std::string done = options_.at_checkpoint(); !done.empty()) files_.log.note(done);
+  files_.whole(now.time);
 }
 
 /// Of history.csv, beside those of every run.
@@ -209,31 +242,72 @@ void TimeLoop::write_fields() {
   results_.write(field_step(files_.summary.steps, case_.control.end_time, problem_, before_));
 }
 
-void TimeLoop::write_state() {
-  Checkpoint checkpoint{files_.summary.steps,     solver_.time(),    size_.size(),          {}, {},
-                        files_.summary.case_hash, options_.versions, comparable_toml(case_)};
-  solver_.save(checkpoint.arrays);
-  control_.save(checkpoint.arrays);
-  checkpoint.arrays.emplace_back(
+/// The master's state after a converged step: what a step that is dropped later has learned does not belong to it.
+void TimeLoop::keep_state() {
+  state_.step = files_.summary.steps;
+  state_.time = solver_.time();
+  state_.dt = size_.size();
+  state_.arrays.clear();
+  solver_.save(state_.arrays);
+  control_.save(state_.arrays);
+  state_.arrays.emplace_back(
       "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
   if (reuses())
-    checkpoint.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
-  checkpoint.states = points_.save();
-  write_checkpoint(options_.folder / "checkpoint.h5", checkpoint);
-  last_checkpoint_ = files_.summary.steps;
-  files_.log.note(fmt::format("checkpoint after step {}", files_.summary.steps));
-  if (const std::string done = options_.at_checkpoint(); !done.empty()) files_.log.note(done);
+    state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
+}
+
+void TimeLoop::write_state() {
+  const auto start = Moment::clock::now();
+  const CheckpointSize size = write_checkpoint(options_.folder / "checkpoint.h5", state_, points_);
+  files_.checkpoint_written();
+  last_saved_ = Moment::clock::now();
+  checkpoint_seconds_ = std::chrono::duration<double>(last_saved_ - start).count();
+  const double points = static_cast<double>(points_.size()), bytes = static_cast<double>(size.bytes);
+  files_.log.note(
+      fmt::format("checkpoint after step {}: {:.3g} s, {:.4g} MB, {} different states; {:.2g} ms and {:.3g} kB a point",
+                  state_.step, checkpoint_seconds_, bytes / 1e6, size.states, 1e3 * checkpoint_seconds_ / points,
+                  bytes / 1e3 / points));
+  files_.summary.checkpoints += 1;
+  files_.summary.checkpoint_seconds += checkpoint_seconds_;
+  files_.summary.checkpoint_bytes = size.bytes;
+}
+
+bool TimeLoop::checkpoint_due() const {
+  const OutputParameters& output = case_.output;
+  const std::chrono::duration<double, std::ratio<60>> since = Moment::clock::now() - last_saved_;
+  return (output.checkpoint_every > 0 && files_.summary.steps % output.checkpoint_every == 0) ||
+         (output.checkpoint_minutes > 0 && since.count() >= output.checkpoint_minutes);
+}
+
+/// Seconds for one more evaluation and the last checkpoint, with reserves; before the first checkpoint a guess.
+double TimeLoop::needed_to_end() const {
+  constexpr double kReserve = 5, kGuess = 0.02;  // [s], [s] a point
+  const double guess = problem_.on_volume_elements() ? kGuess * static_cast<double>(points_.size()) : 0;
+  return 1.5 * longest_evaluation_ + (checkpoint_seconds_ > 0 ? 2 * checkpoint_seconds_ : guess) + kReserve;
+}
+
+bool TimeLoop::told_to_end() {
+  if (end_reason_.empty()) end_reason_ = end_request_.reason(needed_to_end()).value_or("");
+  return !end_reason_.empty();
+}
+
+/// Saves, unless it is saved already; the sentence about it.
+std::string TimeLoop::stopped() {
+  if (files_.last_checkpoint() != state_.step) write_state();
+  return fmt::format("{}: stopped and saved after step {} (time {:g}) in {}; run again with --restart", end_reason_,
+                     state_.step, solver_.time(), options_.folder.string());
 }
 
 void TimeLoop::restart() {
-  points_.load(resumed_.states);
+  points_.load_each(resumed_file_->states());
+  resumed_file_.reset();
   solver_.load(resumed_.arrays);
   control_.load(resumed_.arrays);
   before_ = solver_.committed();
   size_.set_size(resumed_.dt);
-  files_.summary.steps = last_checkpoint_ = resumed_.step;
-  whole_time_ = resumed_.time;
-  files_.whole(last_checkpoint_);
+  files_.summary.steps = resumed_.step;
+  files_.checkpoint_written();
+  files_.whole(resumed_.time);
   files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
   files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
   if (reuses()) {
@@ -243,6 +317,7 @@ void TimeLoop::restart() {
   files_.log.start_from(resumed_.time / case_.control.end_time);
   files_.log.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
   resumed_ = {};
+  keep_state();
 }
 
 }  // namespace
@@ -251,13 +326,16 @@ int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options
   RunOptions locked = options;
   if (!locked.lock) locked.lock = prepare_output_folder(options.folder, options.existing);
   Checkpoint resumed;
+  std::unique_ptr<CheckpointFile> file;
   if (options.existing == Existing::resume) {
-    const std::filesystem::path file = options.folder / "checkpoint.h5";
-    resumed = read_checkpoint(file, hash_of_restart(file, problem.parameters()), options.versions);
+    const std::filesystem::path place = options.folder / "checkpoint.h5";
+    file = std::make_unique<CheckpointFile>(place);
+    resumed = file->read(options.versions);
+    refuse_other_case(place, resumed, problem.parameters());
   }
   std::optional<TimeLoop> loop;
   try {
-    loop.emplace(problem, points, locked, std::move(resumed));
+    loop.emplace(problem, points, locked, std::move(resumed), std::move(file));
   } catch (const DiskError& error) {
     throw DiskError(fmt::format("{}; no step has been made; make room and start again", error.what()));
   }

@@ -98,6 +98,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
   Eigen::VectorXd z, change;
 
   while (result.iterations() < parameters_.max_iterations) {
+    if (result.stopped = told_to_end_(); result.stopped) return result;
     Iteration& now = result.table.emplace_back();
     if (!evaluate(trial, result)) return result;
     const Eigen::VectorXd residual = scaled_residual(trial);
@@ -425,14 +426,6 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   }
   committed_.internal = find_vector(arrays, "solver.internal");
   committed_.external = loads_.external_force(committed_.x, committed_.time, committed_.load_factor);
-}
-
-SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements) {
-  if (!is_given(parameters.tolerance)) parameters.tolerance = volume_elements ? 5e-3 : 1e-8;
-  if (!is_given(parameters.displacement_tolerance)) parameters.displacement_tolerance = volume_elements ? 0.1 : 1e-6;
-  if (!is_given(parameters.qn_first)) parameters.qn_first = volume_elements ? 0.5 : 1;
-  if (!is_given(parameters.qn_scatter)) parameters.qn_scatter = volume_elements ? 0.1 : 0;
-  return parameters;
 }
 
 }  // namespace femxdem

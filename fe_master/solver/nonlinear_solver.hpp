@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct Iteration {
 /// What became of a step.
 struct StepResult {
   bool converged = false;
+  bool stopped = false;        ///< dropped, because the run is to end
   bool best_accepted = false;  ///< accepted above the tolerance, below accept_best_factor times it
   int evaluations = 0;         ///< VE evaluations: every point strained once
   double dem_steps = 0;        ///< DEM steps of all points
@@ -80,6 +82,9 @@ class NonlinearSolver {
   /// Solves the step from the committed state to time t_n + dt and commits it if it converges. With a target, the
   /// factor of the released loads is an unknown and the measure's value the equation for it.
   StepResult solve_step(double dt, const std::optional<MeasureTarget>& target = {});
+
+  /// Asked before every evaluation: where it says so, the step is dropped.
+  void stop_when(std::function<bool()> told_to_end) { told_to_end_ = std::move(told_to_end); }
 
   /// The last equilibrium found, at theta of the last step: that which curves and fields show.
   const Equilibrium& committed() const { return committed_; }
@@ -144,10 +149,7 @@ class NonlinearSolver {
   PointOperators operators_;
   ReusedAnswers reuse_;
   double penalty_;  // r of the augmented Lagrangian [Pa]
+  std::function<bool()> told_to_end_ = [] { return false; };
 };
-
-/// The tolerances of a case, or the defaults where it gives none: 5e-3 (force) and 0.1 (displacement) for volume
-/// elements, whose noise allows no less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
-SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements);
 
 }  // namespace femxdem

@@ -21,10 +21,10 @@ PointOperators::PointOperators(const SolverParameters& parameters, std::span<con
     : parameters_(parameters),
       components_(static_cast<int>(components.size())),
       F_n_(reference.size(), Tensor2::Identity()) {
-  const double first = is_given(parameters.qn_first) ? parameters.qn_first : 1;
-  const double scatter = is_given(parameters.qn_scatter) ? parameters.qn_scatter : 0;
-  const LearningLimits limits{parameters.qn_min, parameters.qn_max,  parameters.qn_skew, first,
-                              scatter,           parameters.qn_noise};
+  LearningLimits limits{.min = parameters.qn_min, .max = parameters.qn_max, .skew = parameters.qn_skew};
+  if (is_given(parameters.qn_first)) limits.first = parameters.qn_first;
+  if (is_given(parameters.qn_scatter)) limits.scatter = parameters.qn_scatter;
+  limits.noise = parameters.qn_noise;
   for (const Response& r : reference) {
     elastic_.push_back(parameters.operator_scale * r.stiffness);
     elastic_acoustic_determinants_.push_back(min_acoustic_determinant(r.stiffness));

@@ -36,4 +36,12 @@ struct SolverParameters {
   double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
 };
 
+/// With tolerances where none are given: 5e-3 (force) and 0.1 (displacement) for volume elements, whose noise allows no
+/// less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
+inline SolverParameters with_default_tolerances(SolverParameters parameters, bool volume_elements) {
+  if (!is_given(parameters.tolerance)) parameters.tolerance = volume_elements ? 5e-3 : 1e-8;
+  if (!is_given(parameters.displacement_tolerance)) parameters.displacement_tolerance = volume_elements ? 0.1 : 1e-6;
+  return parameters;
+}
+
 }  // namespace femxdem

@@ -16,10 +16,10 @@ using contract::expect_same_bits;
 using contract::gradients;
 using contract::part;
 
-WorkerCommand dummy(const std::string& engine = "protocol:DummyEngine") {
+WorkerCommand dummy(const std::string& engine = "dummy_engine:DummyEngine") {
   WorkerCommand command;
   command.engine = engine;
-  if (engine.starts_with("slow_engine")) command.python_path = TEST_ENGINES;
+  command.python_path = TEST_ENGINES;
   return command;
 }
 

@@ -1,17 +1,13 @@
 """Dummy volume elements that take their time, cannot fork, or do not start: for tests of the worker."""
 
 import os
-import pathlib
 import resource
-import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "yade_scripts"))
-
-import protocol
+from dummy_engine import DummyEngine
 
 
-class SlowEngine(protocol.DummyEngine):
+class SlowEngine(DummyEngine):
     """0.3 s for each deform."""
 
     def deform(self, ve, velocity_gradient, steps):
@@ -19,7 +15,7 @@ class SlowEngine(protocol.DummyEngine):
         super().deform(ve, velocity_gradient, steps)
 
 
-class TemplateEngine(protocol.DummyEngine):
+class TemplateEngine(DummyEngine):
     """make_template does what the specification asks for."""
 
     def make_template(self, spec):
@@ -32,7 +28,7 @@ class TemplateEngine(protocol.DummyEngine):
         return super().make_template(spec)
 
 
-class UnforkableEngine(protocol.DummyEngine):
+class UnforkableEngine(DummyEngine):
     """In a process that may start no other (limits do not bind root)."""
 
     def __init__(self, report_fields):

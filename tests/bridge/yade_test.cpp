@@ -242,7 +242,9 @@ TEST(PaperLaw, Contract) {
   VolumeElementOptions options;
   options.min_steps = 1;
   CellsOfThePaper cells(3, 2, options);
-  contract::check_local(cells.points, tolerances());
+  contract::Tolerances longer = tolerances();
+  longer.strain = 1e-3;  // so many DEM steps that those of two halves are as fast as those of the whole
+  contract::check_local(cells.points, longer);
 }
 
 TEST(PaperLaw, SwitchesThreadsAndARestartGiveTheSameBitsAndYadeRepeatsNothing) {

@@ -2,6 +2,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 
@@ -15,7 +16,8 @@ constexpr int kNoMore = -1;
 
 WorkerCommand dummy() {
   WorkerCommand command;
-  command.engine = "protocol:DummyEngine";
+  command.engine = "dummy_engine:DummyEngine";
+  command.python_path = TEST_ENGINES;
   return command;
 }
 
@@ -56,11 +58,15 @@ void leave(LocalPoints& local) {
   while (local.size() > 0) local.remove(local.size() - 1);
 }
 
+PathLengthPoints::State PathLengthPoints::state_of(const std::string& bytes) {
+  State state;
+  if (bytes.size() != sizeof state) throw UserError("not a state of a path-length point");
+  std::memcpy(&state, bytes.data(), sizeof state);
+  return state;
+}
+
 void PathLengthPoints::add(const std::string& state, std::size_t count) {
-  State fresh;
-  if (state.size() != sizeof fresh) throw UserError("not a state of a path-length point");
-  std::memcpy(&fresh, state.data(), sizeof fresh);
-  committed_.resize(size() + count, fresh);
+  committed_.resize(size() + count, state_of(state));
 }
 
 std::string PathLengthPoints::at_rest(double modulus) {
@@ -98,15 +104,16 @@ std::string PathLengthPoints::save_one(std::size_t index) {
   return {reinterpret_cast<const char*>(&committed_[index]), sizeof(State)};
 }
 
-SavedStates PathLengthPoints::save() {
-  SavedStates states;
-  for (std::size_t i = 0; i < size(); ++i) states.push_back(save_one(i));
-  return states;
+void PathLengthPoints::save_each(const TakeState& take) {
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (committed_[i].length > 10) throw std::runtime_error("too long to be saved");
+    take(save_one(i), std::array{i});
+  }
 }
 
-void PathLengthPoints::load(const SavedStates& states) {
-  committed_.clear();
-  for (const std::string& state : states) add(state, 1);
+void PathLengthPoints::load_into(std::span<const std::size_t> points, const std::string& state) {
+  const State loaded = state_of(state);
+  for (const std::size_t i : points) committed_.at(i) = loaded;
 }
 
 }  // namespace femxdem

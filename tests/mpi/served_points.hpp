@@ -10,7 +10,7 @@ namespace femxdem {
 
 /// Elastic cell whose stress also depends on the length of its path: sigma = R (E (U - I) + H s I) R^T, s the sum of
 /// |U - U_n|. A trial counts 7 DEM steps, or more with more than 1e8 Pa in proportion. A gradient with F_22 above 10
-/// throws on the rank that holds the point.
+/// throws on the rank that holds the point, as does saving one whose path is longer than 10.
 class PathLengthPoints : public LocalPoints {
  public:
   void add(const std::string& state, std::size_t count) override;
@@ -20,8 +20,8 @@ class PathLengthPoints : public LocalPoints {
   std::size_t size() const override { return committed_.size(); }
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { committed_ = trial_; }
-  SavedStates save() override;
-  void load(const SavedStates& states) override;
+  void save_each(const TakeState& take) override;
+  void load_into(std::span<const std::size_t> points, const std::string& state) override;
 
   /// State at rest with modulus E [Pa].
   static std::string at_rest(double modulus);
@@ -32,6 +32,7 @@ class PathLengthPoints : public LocalPoints {
     double length = 0;
     std::array<double, 9> U{1, 0, 0, 0, 1, 0, 0, 0, 1};
   };
+  static State state_of(const std::string& bytes);
   Response respond(std::size_t index, const Tensor2& F, Operator wanted);
 
   std::vector<State> committed_;

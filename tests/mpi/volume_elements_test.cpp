@@ -186,6 +186,31 @@ TEST(VolumeElements, UsersMistakesStayUsersMistakes) {
   EXPECT_THROW(farm.points->evaluate(gradients(2, 1e-3), Operator::none), std::invalid_argument);
 }
 
+TEST(VolumeElements, WhoFailsWhileStatesAreHandedOverFailsAlone) {
+  Farm farm(Law::path_length, kTemplates, kSeven);
+  struct TakerFails : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+  std::size_t taken = 0;
+  EXPECT_THROW(farm.points->save_each([&](const std::string&, std::span<const std::size_t>) {
+    if (++taken == 3) throw TakerFails("the disk is full");
+  }),
+               TakerFails);
+  EXPECT_EQ(taken, 3U);
+  const SavedStates states = farm.points->save();
+  for (std::size_t k = 0; k < kSeven.size(); ++k) {
+    std::vector<Tensor2> F(kSeven.size(), Tensor2::Identity());
+    for (const double stretch : {9.0, 1.0}) {  // the path of point k becomes too long to be saved
+      F[k](2, 2) = stretch;
+      trial(*farm.points, F);
+      farm.points->commit();
+    }
+    EXPECT_THROW(farm.points->save(), std::runtime_error);
+    farm.points->load(states);
+    EXPECT_EQ(farm.points->save(), states);
+  }
+}
+
 TEST(VolumeElements, StatisticsCount) {
   Farm farm(Law::path_length, kTemplates, kSeven);
   const auto F = gradients(kSeven.size(), 1e-2);

@@ -3,6 +3,7 @@
     test_batch.py FEMXDEM CASES      FEMXDEM: the executable; CASES: the folder with batch.toml
 """
 
+import json
 import os
 import signal
 import subprocess
@@ -11,6 +12,11 @@ import tempfile
 import time
 import unittest
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation" / "cluster"))
+sys.dont_write_bytecode = True
+
+from same_results import differences
 
 FEMXDEM, CASES = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 FOLDER = Path(tempfile.mkdtemp(prefix="femxdem_batch_"))
@@ -43,14 +49,51 @@ class TwoJobs(unittest.TestCase):
         self.assertIn("taken over", said)
         self.assertFalse((FOLDER / "mix/running.lock").exists())
 
-    def test_a_job_that_is_told_to_end_leaves_no_lock(self):
-        slow = ["--set", "control.step=1e-5", "--set", "control.max_step=1e-5"]
-        job = subprocess.Popen([str(FEMXDEM), "run", str(LAW), "--out", "told", *slow], cwd=FOLDER, stdout=subprocess.DEVNULL)
-        while not (FOLDER / "told/history.csv").exists():
-            time.sleep(0.02)
-        job.send_signal(signal.SIGTERM)
-        self.assertEqual(job.wait(timeout=20), -signal.SIGTERM)
-        self.assertFalse((FOLDER / "told/running.lock").exists())
+
+class ToldToEnd(unittest.TestCase):
+    STEPS = ["--set", "control.end_time=0.24", "--set", "control.step=4e-3", "--set", "control.max_step=4e-3",
+             "--set", "output.checkpoint_every=0"]
+
+    def start(self, *arguments):
+        return subprocess.Popen([str(FEMXDEM), "run", str(LAW), *self.STEPS, *arguments], cwd=FOLDER,
+                                stdout=subprocess.PIPE, text=True)
+
+    def wait_for_rows(self, folder, count):
+        file = FOLDER / folder / "history.csv"
+        while not file.exists() or file.read_text().count("\n") <= count:
+            time.sleep(0.002)
+
+    def test_it_saves_ends_with_75_and_goes_on_as_if_nothing_had_been(self):
+        self.assertEqual(run(LAW, *self.STEPS, "--out", "untold")[0], 0)
+        for number, name in enumerate((signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, signal.SIGHUP)):
+            job = self.start("--out", "told", "--restart" if number else "--overwrite")
+            self.wait_for_rows("told", 15 * number + 8)
+            job.send_signal(name)
+            said = job.communicate(timeout=20)[0]
+            self.assertEqual(job.returncode, 75, said)
+            self.assertIn(f"stopped: {name.name}: stopped and saved after step", said)
+            self.assertFalse((FOLDER / "told/running.lock").exists())
+            self.assertEqual(json.loads((FOLDER / "told/summary.json").read_text())["status"], "stopped")
+        status, said = run(LAW, *self.STEPS, "--out", "told", "--restart")
+        self.assertEqual(status, 0, said)
+        self.assertEqual(differences(FOLDER / "untold", FOLDER / "told"), [])
+
+    def test_it_ends_before_its_time_is_over(self):
+        slow = ["--set", "control.step=1e-5", "--set", "control.max_step=1e-5", "--set", "output.every=1000"]
+        for arguments, env in ((["--time-limit", "0:07"], {}), ([], {"SLURM_JOB_END_TIME": str(int(time.time()) + 8)})):
+            start = time.monotonic()
+            status, said = run(LAW, "--out", "limit", "--overwrite", *slow, *arguments, env={**os.environ, **env})
+            self.assertEqual(status, 75, said)
+            self.assertLess(time.monotonic() - start, 7)
+            self.assertIn("s of its time are left: stopped and saved after step", said)
+        status, said = run(LAW, "--out", "limit", "--restart", "--time-limit", "1h")
+        self.assertEqual((status, "--time-limit '1h': is no duration" in said), (2, True), said)
+
+    def test_checkpoints_by_minutes(self):
+        minutes = ["--set", "output.checkpoint_minutes=1e-9"]
+        self.assertEqual(run(LAW, "--out", "minutes", *minutes, "--set", "output.checkpoint_every=0")[0], 0)
+        log = (FOLDER / "minutes/log.txt").read_text()
+        self.assertEqual(log.count("checkpoint after step"), 20)
 
 
 @unittest.skipUnless(os.geteuid() == 0, "a small file system can only be mounted by root")

@@ -15,6 +15,11 @@ import unittest
 from pathlib import Path
 
 FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation" / "cluster"))
+sys.dont_write_bytecode = True
+
+from same_results import differences
+
 TIME_COLUMNS = ("dem_seconds", "wall_s")
 FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
 CACHE = Path(FOLDER.name) / "packings"
@@ -107,7 +112,7 @@ class Program(unittest.TestCase):
             self.assertEqual(history(out), self.reference)
 
     def test_both_engines_have_the_same_history(self):
-        out, status, said = run("yade", *YADE, *IN_ORDER)
+        out, status, said = run("in_yade", *YADE, *IN_ORDER)
         self.assertEqual(status, 0, said)
         self.assertEqual(engine(out), "yade")
         self.assertEqual(history(out), self.reference)
@@ -137,13 +142,34 @@ class Program(unittest.TestCase):
             time.sleep(0.02)
         before = below(workers() | {r: mpirun.pid for r in ranks_of(mpirun)}, mpirun.pid)
         os.kill(ranks_of(mpirun)[0], signal.SIGKILL)
-        time.sleep(2)
+        mpirun.wait(timeout=60)  # it ends the other rank by SIGKILL, a second after the SIGTERM that ranks ignore
+        time.sleep(1)
         self.assertEqual(before & workers().keys(), set())
-        mpirun.wait(timeout=60)
         self.assertLess(len(history(out)), 6)
         _, status, said = run("restart", "--restart", ranks=2)
         self.assertEqual(status, 0, said)
         self.assertEqual(history(out), self.reference)
+
+    def test_told_to_end_by_a_signal_to_all_its_processes_it_goes_on_with_other_ranks(self):
+        out = Path(FOLDER.name) / "told"
+        for ranks, rows in ((2, 1), (4, 3)):  # SIGUSR1 by way of mpirun, then SIGTERM to every process but mpirun
+            how = ["--restart"] if ranks == 4 else []
+            mpirun = subprocess.Popen(command(out, "--set", "output.checkpoint_every=0", *how, ranks=ranks),
+                                      stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            while not ((out / "history.csv").exists() and len(history(out)) >= rows):
+                self.assertIsNone(mpirun.poll(), "the run ended before it was told to")
+                time.sleep(0.01)
+            if ranks == 2:
+                mpirun.send_signal(signal.SIGUSR1)
+            else:
+                for pid in below(workers() | {r: mpirun.pid for r in ranks_of(mpirun)}, mpirun.pid):
+                    os.kill(pid, signal.SIGTERM)
+            said = mpirun.communicate(timeout=60)[0]
+            self.assertEqual(mpirun.returncode, 75, said)
+        self.assertLess(len(history(out)), 6)
+        _, status, said = run("told", "--restart")
+        self.assertEqual(status, 0, said)
+        self.assertEqual(differences(Path(FOLDER.name) / "reference", out), [])
 
     def test_a_killed_trial_does_not_change_the_result(self):
         out, remarks = Path(FOLDER.name) / "killed", Path(FOLDER.name) / "remarks.txt"

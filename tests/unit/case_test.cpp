@@ -256,17 +256,18 @@ TEST(VePool, RegionsAndSeedsMakeTemplates) {
   EXPECT_EQ(pool.templates[0].friction, 0.5);
   EXPECT_EQ(pool.templates[1].friction, 0.4);
   EXPECT_EQ(pool.templates[1].seed, 5);
-  for (int e = 0; e < 32; ++e) EXPECT_EQ(pool.template_of_element[e], e == 9 ? 1 : 0) << e;
+  ASSERT_EQ(pool.template_of_point.size(), 128u);
+  for (int p = 0; p < 128; ++p) EXPECT_EQ(pool.template_of_point[p], p / 4 == 9 ? 1 : 0) << p;
 }
 
 TEST(VePool, RandomAssignmentFollowsItsSeedAlone) {
   const Case c = volume_elements({"ve.assignment_seed=3"});
   const Mesh mesh = make_mesh(c.mesh, c.regions);
   const VePool pool = ve_pool(c, mesh), again = ve_pool(c, mesh);
-  EXPECT_EQ(pool.template_of_element, again.template_of_element);
-  EXPECT_NE(pool.template_of_element, ve_pool(volume_elements({"ve.assignment_seed=4"}), mesh).template_of_element);
+  EXPECT_EQ(pool.template_of_point, again.template_of_point);
+  EXPECT_NE(pool.template_of_point, ve_pool(volume_elements({"ve.assignment_seed=4"}), mesh).template_of_point);
   std::set<int> seeds;
-  for (int t : pool.template_of_element) seeds.insert(pool.templates.at(t).seed);
+  for (int t : pool.template_of_point) seeds.insert(pool.templates.at(t).seed);
   EXPECT_EQ(seeds, (std::set<int>{1, 2, 3}));
   EXPECT_EQ(pool.templates.size(), 4u) << "three seeds, and one of them in the weak region";
 }

@@ -24,8 +24,8 @@ class MeanPoints : public MaterialPoints {
     return responses;
   }
   void commit() override { committed_ = trial_; }
-  SavedStates save() override { return {}; }
-  void load(const SavedStates&) override {}
+  void save_each(const TakeState&) override {}
+  void load_each(const StateSource&) override {}
 
   const LawState& committed(std::size_t point) const { return committed_[point]; }
   void set_committed(const MeanPoints& other) { committed_ = trial_ = other.committed_; }

@@ -27,8 +27,8 @@ class Watched : public MaterialPoints {
     before = state;
     state = asked.back();
   }
-  SavedStates save() override { return points_.save(); }
-  void load(const SavedStates& states) override { points_.load(states); }
+  void save_each(const TakeState& take) override { points_.save_each(take); }
+  void load_each(const StateSource& states) override { points_.load_each(states); }
 
  private:
   MaterialPoints& points_;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -182,11 +183,12 @@ struct Follow : testing::Test {
     std::istringstream rows(text("history.csv"));
     std::vector<double> values;
     std::size_t place = 0;
-    for (std::string row; std::getline(rows, row);) {
+    bool names = true;
+    for (std::string row; std::getline(rows, row); names = false) {
       std::istringstream cells(row);
       std::vector<std::string> list;
       for (std::string cell; std::getline(cells, cell, ',');) list.push_back(cell);
-      if (values.empty() && place == 0) {
+      if (names) {
         place = static_cast<std::size_t>(std::find(list.begin(), list.end(), name) - list.begin());
         EXPECT_LT(place, list.size()) << name;
       } else {
@@ -230,6 +232,40 @@ TEST_F(Follow, WritesTheFilesOfARun) {
   EXPECT_NE(text("summary.json").find("\"status\": \"done\""), std::string::npos);
   EXPECT_EQ(read_case((folder / "case.toml").string(), {}, Purpose::ve_path).path[0].strain[yy], -0.001);
   EXPECT_THROW(follow_path(c, *make_analytic_point(c), options), UserError);  // results are there
+}
+
+/// Tells the process to end after some steps.
+class TellingPoint : public AnalyticPoints {
+ public:
+  using AnalyticPoints::AnalyticPoints;
+  void commit() override {
+    AnalyticPoints::commit();
+    if (++commits_ == 9) std::raise(SIGUSR1);
+  }
+
+ private:
+  int commits_ = 0;
+};
+
+TEST_F(Follow, ToldToEndItGoesOnAsIfNothingHadBeen) {
+  const Case c =
+      read_path_case(kGood, {"path.0.strain_yy=-0.001", "path.0.stress_xx=-1e4", "material.initial_pressure=1e4"});
+  EXPECT_EQ(follow_path(c, *make_analytic_point(c), options), kDone);
+  std::vector<std::vector<double>> whole;
+  for (const char* name : {"step", "time", "evaluations", "residual", "strain_xx", "stress_yy"})
+    whole.push_back(column(name));
+  int ended = 0, status = kRunAgain;
+  options.existing = Existing::overwrite;
+  for (; status == kRunAgain && ended < 20; ++ended) {
+    TellingPoint point({make_law(c.material)});
+    status = follow_path(c, point, options);
+    options.existing = Existing::resume;
+  }
+  EXPECT_EQ(status, kDone);
+  EXPECT_EQ(ended, 7) << "runs of at most eight steps";
+  std::size_t k = 0;
+  for (const char* name : {"step", "time", "evaluations", "residual", "strain_xx", "stress_yy"})
+    EXPECT_EQ(column(name), whole[k++]) << name;
 }
 
 /// Stress control cannot pass a peak: cut to the smallest step, status 3, and the rows up to there.

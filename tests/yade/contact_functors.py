@@ -228,6 +228,9 @@ def outcome(scene, packing_text, folder):
             resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
             said = _made(scene, packing_text, Path(folder), lambda: os.write(writer, b"ran\n"))
             os.write(writer, repr(said).encode())
+        except Exception as error:
+            said = {"what": "died", "why": "".join(traceback.format_exception_only(error)).strip()}
+            os.write(writer, repr(said).encode())
         finally:
             os._exit(0)
     os.close(writer)
@@ -259,8 +262,6 @@ def _made(scene, packing_text, folder, ran):
         made = engine().make_template(users("script", path, script_steps=30_000, compare=COMPARE))
     except (ValueError, RuntimeError) as error:
         return {"what": "refused", "why": str(error)}
-    except Exception as error:
-        return {"what": "died", "why": "".join(traceback.format_exception_only(error)).strip()}
     m = made["manifest"]
     if not m["mean_stress"] > 0:  # bridge/straining.cpp
         return {"what": "refused", "why": f"mean stress {m['mean_stress']:.3g} Pa: without pressure the inertial number sets no rate"}
@@ -273,7 +274,7 @@ def _made(scene, packing_text, folder, ran):
     if said["what"] == "kn, ks":
         kn, kt = contact_loop.stiffnesses(O, c)
         eq2 = contact_loop.stiffness(c, kn, kt, O.cell.volume)
-        probed = probing.stiffness(O, engine()._love_weber, engine()._to_forces)
+        probed = probing.stiffness(O, engine()._love_weber)
         said["eq2"] = float(np.linalg.norm(eq2 - probed) / np.linalg.norm(probed))
     said["step"], said["step_unbalanced"] = _error_of_step(made["state"])
     return said

@@ -128,7 +128,7 @@ Tensor2 stress_of(PythonVolumeElements& point, const Tensor2& F) {
 /// tolerance), 7e-4 between the points.
 TEST_F(OneElement, AnswersAsItsVolumeElement) {
   Cells same_strains(c, 1), same_path(c, 1);
-  PathDriver driver(same_path.points, with_default_tolerances(c.solver, true));
+  PathDriver driver(same_path.points, solver_parameters(c));
   PathSegment segment;
   segment.stress[0] = -1e5;
   double from_strains = 0, from_path = 0, between_points = 0;

@@ -53,7 +53,7 @@ class Start(unittest.TestCase):
         for name in SPECS:
             c = cell(name)
             np.testing.assert_allclose(c.stress(), -SIGMA * np.eye(3), rtol=0, atol=1e-3 * SIGMA, err_msg=name)
-            self.assertLess(c.unbalanced_force(), 1e-4, name)
+            self.assertLess(c.report()["unbalanced_force"], 1e-4, name)
             before = c.stress()
             c.deform(np.zeros((3, 3)), 500)
             np.testing.assert_allclose(c.stress(), before, rtol=0, atol=1e-4 * SIGMA, err_msg=name)

@@ -34,7 +34,8 @@ def verify(c, names):
         outcomes = []
         for scene in scenes[name]:
             with tempfile.TemporaryDirectory() as folder:
-                found = c.value(f"{name}/{scene.slug}", {"script": contact_functors.script(scene, text)}, lambda: contact_functors.outcome(scene, text, folder))
+                asked = {"script": contact_functors.script(scene, text)}
+                found = c.value(f"{name}/{scene.slug}", asked, lambda: contact_functors.outcome(scene, text, folder))
             outcomes.append((scene, found))
             print(contact_functors.row(scene, found), flush=True)
         wrong += [scene.name for scene, found in outcomes if contact_functors.faults(found)]

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Cost of the elastic stiffness of a volume element, Eq. (2), beside that of a DEM step.
 
-    bridge/stiffness_benchmark.py [--spheres N] [--law adhesive|bonded|friction] [--repetitions R] [--build build/release]
+    validation/engine/stiffness.py [--spheres N] [--law adhesive|bonded|friction] [--repetitions R] [--build build/release]
 
 Processor time, least and median of the repetitions; the packing is prepared first (half a minute for 1000 spheres).
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 os.environ["OMP_NUM_THREADS"] = "1"
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def milliseconds(work, repetitions):
