@@ -90,7 +90,7 @@ run_tests() {
     selected=(-L "^$1\$")
   fi
   build
-  install_packages "${TEST_PACKAGES[@]}"
+  (install_packages "${TEST_PACKAGES[@]}") || say "no ${TEST_PACKAGES[*]}: the page of femxdem report is not opened in a browser"
   allow_mpi_everywhere
   count=$(ctest --test-dir "$BUILD" -N "${selected[@]}" | sed -n 's/^Total Tests: //p')
   if ((count == 0)); then

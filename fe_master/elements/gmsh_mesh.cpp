@@ -1,8 +1,14 @@
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <gmsh.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
+#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <set>
@@ -246,6 +252,39 @@ void generate(const std::string& file) {
   if (!error.empty()) throw error;  // as the rest of Gmsh does
 }
 
+Mesh opened(const std::string& file) {
+  const GmshSession session;
+  gmsh::open(file);
+  std::vector<int> types;
+  std::vector<std::vector<std::size_t>> elements, element_nodes;
+  gmsh::model::mesh::getElements(types, elements, element_nodes, 2);
+  if (types.empty() && file.ends_with(".geo")) generate(file);
+  return read_model(file);
+}
+
+/// Damaged files end Gmsh's library by a signal, or never: it reads them first in a process of its own.
+void refuse_what_ends_gmsh(const std::string& file) {
+  constexpr unsigned kLongest = 1800;  // [s]
+  const pid_t child = fork();
+  if (child < 0) return;
+  if (child == 0) {
+    for (const int number : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGALRM}) std::signal(number, SIG_DFL);
+    alarm(kLongest);
+    if (const int nothing = open("/dev/null", O_WRONLY); nothing >= 0) dup2(nothing, STDERR_FILENO);
+    try {
+      opened(file);
+    } catch (...) {  // it is said by the process that reads the file for good
+    }
+    _exit(0);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFSIGNALED(status))
+    throw UserError(fmt::format("{}: Gmsh cannot read it (its library ends with signal {}, {}); open it in Gmsh and export it again",
+                                file, WTERMSIG(status), strsignal(WTERMSIG(status))));
+}
+
 }  // namespace
 
 Mesh gmsh_mesh(const std::string& file) {
@@ -253,14 +292,9 @@ Mesh gmsh_mesh(const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension().string();
   if (extension != ".msh" && extension != ".geo")
     throw UserError(fmt::format("{}: not a Gmsh file by its name; give a mesh (.msh) or a geometry (.geo)", file));
-  const GmshSession session;
+  refuse_what_ends_gmsh(file);
   try {
-    gmsh::open(file);
-    std::vector<int> types;
-    std::vector<std::vector<std::size_t>> elements, element_nodes;
-    gmsh::model::mesh::getElements(types, elements, element_nodes, 2);
-    if (types.empty() && extension == ".geo") generate(file);
-    return read_model(file);
+    return opened(file);
   } catch (const std::string& error) {  // what Gmsh's API throws
     throw UserError(fmt::format("{}: Gmsh cannot read it ({}); open it in Gmsh and export it again", file, error));
   }

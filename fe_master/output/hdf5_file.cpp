@@ -48,6 +48,13 @@ hid_t string_type(std::size_t length) {
   return type;
 }
 
+/// Whether there is such an attribute, of one value.
+bool is_single(hid_t attribute) {
+  if (attribute < 0) return false;
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  return space >= 0 && H5Sget_simple_extent_npoints(space) == 1;
+}
+
 }  // namespace
 
 Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file), mode_(mode) {
@@ -167,14 +174,22 @@ Shape Hdf5File::shape(const std::string& path) const {
   const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (set < 0) fail("no such data set", path);
   const Handle space(H5Dget_space(set), H5Sclose);
-  std::vector<hsize_t> lengths(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space)));
+  const int axes = H5Sget_simple_extent_ndims(space);
+  if (axes < 0) fail("no shape of the data set", path);
+  std::vector<hsize_t> lengths(static_cast<std::size_t>(axes));
   H5Sget_simple_extent_dims(space, lengths.data(), nullptr);
   return {lengths.begin(), lengths.end()};
 }
 
+/// Number of values; a file that is damaged may claim more than it holds.
+std::size_t Hdf5File::count(const std::string& path, const Shape& lengths) const {
+  const double claimed = std::accumulate(lengths.begin(), lengths.end(), 1.0, std::multiplies<>());
+  if (claimed > static_cast<double>(std::filesystem::file_size(file_))) fail("more values than the file has bytes", path);
+  return static_cast<std::size_t>(claimed);
+}
+
 std::vector<double> Hdf5File::read(const std::string& path) const {
-  const Shape lengths = shape(path);
-  std::vector<double> values(std::accumulate(lengths.begin(), lengths.end(), std::size_t{1}, std::multiplies<>()));
+  std::vector<double> values(count(path, shape(path)));
   const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (!values.empty() && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail("cannot read the data set", path);
@@ -183,7 +198,9 @@ std::vector<double> Hdf5File::read(const std::string& path) const {
 }
 
 std::string Hdf5File::read_bytes(const std::string& path) const {
-  std::string bytes(shape(path).at(0), '\0');
+  const Shape lengths = shape(path);
+  if (lengths.size() != 1) fail("not a row of bytes", path);
+  std::string bytes(count(path, lengths), '\0');
   const Handle set(H5Dopen2(id_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (!bytes.empty() && H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0) {
     fail("cannot read the data set", path);
@@ -194,14 +211,15 @@ std::string Hdf5File::read_bytes(const std::string& path) const {
 double Hdf5File::number(const std::string& group, const std::string& name) const {
   const Handle attribute(H5Aopen_by_name(id_, group.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   double value = 0;
-  if (attribute < 0 || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) fail("no attribute " + name, group);
+  if (!is_single(attribute) || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) fail("no attribute " + name, group);
   return value;
 }
 
 std::string Hdf5File::text(const std::string& group, const std::string& name) const {
   const Handle attribute(H5Aopen_by_name(id_, group.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  if (attribute < 0) fail("no attribute " + name, group);
+  if (!is_single(attribute)) fail("no attribute " + name, group);
   const Handle type(H5Aget_type(attribute), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0) fail("no text in attribute " + name, group);
   std::string value(H5Tget_size(type), '\0');
   if (H5Aread(attribute, type, value.data()) < 0) fail("cannot read attribute " + name, group);
   value.erase(std::find(value.begin(), value.end(), '\0'), value.end());

@@ -64,6 +64,7 @@ class Hdf5File {
   std::vector<std::string> members(const std::string& group) const;
 
  private:
+  std::size_t count(const std::string& path, const Shape& lengths) const;
   [[noreturn]] void fail(std::string_view what, std::string_view path) const;
   [[noreturn]] void fail_to_write(std::string_view what, std::string_view path);
   void write_raw(const std::string& path, const void* values, std::size_t count, const Shape& shape,

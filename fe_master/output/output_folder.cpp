@@ -8,7 +8,9 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "errors.hpp"
 
@@ -25,6 +27,19 @@ void remove_results(const fs::path& folder) {
   for (const char* name : kFilesOfARun) fs::remove(folder / name);
 }
 
+/// Files that a run wrote beside its own (replace_file) when it was killed.
+void remove_leftovers(const fs::path& folder) {
+  constexpr std::size_t kSuffix = 7;  // .XXXXXX
+  std::vector<fs::path> leftovers;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    for (const std::string_view file : kFilesOfARun)
+      if (name.size() == file.size() + kSuffix && name.starts_with(std::string(file) + "."))
+        leftovers.push_back(entry.path());
+  }
+  for (const fs::path& leftover : leftovers) fs::remove(leftover);
+}
+
 }  // namespace
 
 std::unique_ptr<FolderLock> prepare_output_folder(const fs::path& folder, Existing existing) {
@@ -39,6 +54,7 @@ std::unique_ptr<FolderLock> prepare_output_folder(const fs::path& folder, Existi
                                 std::strerror(errno)));
   }
   auto lock = std::make_unique<FolderLock>(folder);
+  remove_leftovers(folder);
   if (existing == Existing::overwrite) remove_results(folder);
   const bool holds_results = fs::exists(folder / "history.csv") || fs::exists(folder / "results.h5");
   if (existing == Existing::refuse && holds_results) {

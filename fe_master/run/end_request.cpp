@@ -80,8 +80,6 @@ EndRequest::EndRequest(std::optional<Moment> before) : before_(before) {
   handle_with(remember);
 }
 
-EndRequest::~EndRequest() { end_at_signals(); }
-
 std::optional<double> EndRequest::seconds_left() const {
   if (!before_) return std::nullopt;
   return std::chrono::duration<double>(*before_ - Moment::clock::now()).count();

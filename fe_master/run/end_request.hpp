@@ -12,13 +12,12 @@ using Moment = std::chrono::steady_clock::time_point;
 /// by the signal). Signals that are ignored already (nohup) stay so.
 void end_at_signals();
 
-/// Why a run is to end although there is more to do. While it lives, the first of kEndSignals is remembered instead; a
-/// second SIGINT ends the process at once.
+/// Why a run is to end although there is more to do. From its making on the first of kEndSignals is remembered instead,
+/// also when it is gone: a run that has ended keeps its status. A second SIGINT ends the process at once.
 class EndRequest {
  public:
   /// `before`: the moment by which the process must have ended, if there is one.
   explicit EndRequest(std::optional<Moment> before);
-  ~EndRequest();
   EndRequest(const EndRequest&) = delete;
   EndRequest& operator=(const EndRequest&) = delete;
 

@@ -155,16 +155,17 @@ def main():
                          CLUSTER / "slurm.sh", case, results, *words)
         if not re.fullmatch(r"\d+\n", said):
             raise SystemExit(f"sbatch: {said}")
-        job, state, seen = said.strip(), "", []
+        job, state, seen, pending = said.strip(), "", [], 0
         while state not in ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL"):
             time.sleep(0.2)
             slurm.check()
             said = slurm.ask("scontrol", "show", "job", job)
             found = re.search(r"JobState=(\w+).*?Restarts=(\d+)", said, re.DOTALL)
             state = found.group(1)
-            if "Reason=BeginTime" in said:  # a requeued job would wait for two minutes
+            pending = pending + 1 if "Reason=BeginTime" in said else 0
+            if pending == 15:  # a requeued job would wait for two minutes; Slurm has done with its last run by now
                 slurm.ask("scontrol", "update", f"JobId={job}", "StartTime=now")
-            if found.groups() not in seen:
+            if found.groups() != (seen or [None])[-1]:
                 seen.append(found.groups())
                 print(f"{time.time() - started:5.1f} s  {state}, {found.group(2)} restarts", flush=True)
             if time.time() - started > 240:

@@ -35,6 +35,16 @@ TEST(EndRequest, ASignalIsRememberedByItsName) {
   }
 }
 
+TEST(EndRequest, ASignalAfterTheRunDoesNotChangeItsStatus) {
+  EXPECT_EXIT(
+      {
+        EndRequest(std::nullopt);
+        std::raise(SIGINT);
+        std::exit(0);
+      },
+      testing::ExitedWithCode(0), "");
+}
+
 TEST(EndRequest, TimeIsOverWhenLessThanNeededIsLeft) {
   const EndRequest request(in_seconds(100));
   EXPECT_FALSE(request.reason(90));

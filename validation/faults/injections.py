@@ -41,6 +41,8 @@ class Place:
     def __init__(self, program, runs, environment, cases):
         self.program, self.runs, self.environment, self.cases = program, Path(runs), environment, cases
         self.references = {}
+        self.work = self.runs / f"of_{os.getpid()}"  # two of them may share the folder of values
+        self.work.mkdir(parents=True, exist_ok=True)
 
     def command(self, fault, folder, existing, settings=()):
         file, own = self.cases[fault.case]
@@ -52,7 +54,7 @@ class Place:
         """Folder of the run that nothing has struck."""
         key = fault.case, fault.settings
         if key not in self.references:
-            folder = self.runs / f"reference_{len(self.references)}_{fault.case}"
+            folder = self.work / f"reference_{len(self.references)}_{fault.case}"
             clean = Fault("reference", fault.case, settings=fault.settings)
             done = subprocess.run(self.command(clean, folder, ["--overwrite"]), env=self.environment, capture_output=True, text=True)
             if done.returncode != 0:
@@ -103,6 +105,12 @@ def same_bits(folder, reference):
     return next((name for name in its if its[name].tobytes() != mine[name].tobytes()), "")
 
 
+def strays(folder):
+    """Files that no run is to leave."""
+    whole = {"case.toml", "checkpoint.h5", "history.csv", "log.txt", "results.h5", "results.xdmf", "summary.json"}
+    return sorted(file.name for file in folder.iterdir() if file.name not in whole)
+
+
 def same_end(folder, reference):
     """The same of the last step alone."""
     if history(folder)[-1:] != history(reference)[-1:]:
@@ -124,7 +132,7 @@ def near(folder, reference):
 
 def inject(place, fault):
     """What came of it: {status, said, readable, steps, restart, differs, way}."""
-    reference, folder = place.reference(fault), place.runs / "struck"
+    reference, folder = place.reference(fault), place.work / "struck"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     undo = fault.prepare(folder) if fault.prepare else None
@@ -155,7 +163,8 @@ def inject(place, fault):
         return {**seen, "way": existing[0], "differs": f"ended with {again.returncode}: {last}"}
     if fault.destroys:
         return {**seen, "way": "noticed", "differs": same_end(folder, reference)}
-    return {**seen, "way": existing[0], "differs": same_bits(folder, reference)}
+    left = strays(folder)
+    return {**seen, "way": existing[0], "differs": f"left behind: {left}" if left else same_bits(folder, reference)}
 
 
 def _struck(place, fault, folder):
@@ -165,7 +174,7 @@ def _struck(place, fault, folder):
         for what, most in fault.limits.items():
             resource.setrlimit(what, (most, most))
 
-    said = place.runs / "said.txt"
+    said = place.work / "said.txt"
     with open(said, "w") as out:
         run = subprocess.Popen(place.command(fault, folder, ["--overwrite"]), env={**place.environment, **fault.environment},
                                stdout=out, stderr=out, preexec_fn=limit if fault.limits else None)

@@ -4,7 +4,7 @@
 
 Every injection is a run with one fault, then, where it has ended, the same run without it from its checkpoint; the end is
 compared with the run that nothing has struck, to the bit (injections.py). Disks, files and kills within a write run on a
-closed-form law (2 x 4 elements, 10 steps, 0.2 s), processes on volume elements of 40 spheres in either engine.
+closed-form law (2 x 4 elements, 6 steps), processes on volume elements of 40 spheres in either engine.
 """
 
 import os
@@ -42,8 +42,8 @@ def of_file(place, name, do, program="femxdem"):
 def calls(place, name):
     """Calls of a whole run that write this file."""
     if name not in place.calls:
-        out, environment = place.runs / "count.txt", of_file(place, name, "COUNT") | {"FAULT_COUNT": str(place.runs / "count.txt")}
-        folder = place.runs / "struck"
+        out, environment = place.work / "count.txt", of_file(place, name, "COUNT") | {"FAULT_COUNT": str(place.work / "count.txt")}
+        folder = place.work / "struck"
         subprocess.run(["rm", "-rf", str(folder)], check=True)
         subprocess.run(place.command(Fault("count"), folder, ["--overwrite"]), env={**place.environment, **environment},
                        stdout=subprocess.DEVNULL, check=True)
@@ -91,7 +91,7 @@ def torn_write(place, rng, k):
 
 @kind("file_taken", 20, "a file of the run removed, emptied, replaced or made read-only in mid-run")
 def file_taken(place, rng, k):
-    name, rows = ("results.h5", "history.csv", "checkpoint.h5", "log.txt", "results.xdmf")[k % 5], rng.randint(1, 8)
+    name, rows = ("results.h5", "history.csv", "checkpoint.h5", "log.txt", "results.xdmf")[k % 5], rng.randint(1, 4)
     how = ("removed", "emptied", "read-only", "another")[k // 5 % 4]
 
     def act(folder):
@@ -114,14 +114,14 @@ def file_taken(place, rng, k):
                  destroys=name in ("results.h5", "history.csv") and how != "read-only")
 
 
-@kind("clock_back", 6, "the clock of the day goes back by an hour to a year")
+@kind("clock_back", 4, "the clock of the day goes back by an hour to a year")
 def clock_back(place, rng, k):
     back = rng.choice((3600, 86400, 31536000))
     environment = of_file(place, "none", "CLOCK") | {"FAULT_CLOCK": str(back), "FAULT_AT": str(rng.randint(0, 200))}
     return Fault(f"by {back} s", case=("law", "compact")[k % 2], environment=environment)
 
 
-@kind("memory", 16, "no more memory: a limit of the address space; fork refused")
+@kind("memory", 8, "no more memory: a limit of the address space; fork refused")
 def memory(place, rng, k):
     case = ("law", "compact", "yade", "yade")[k % 4]
     if k % 4 == 3:
@@ -133,55 +133,55 @@ def memory(place, rng, k):
 
 def at_random(of, numbers, cases, place, rng, k, ranks_=1):
     number, case = numbers[k % len(numbers)], cases[k // len(numbers) % len(cases)]
-    strike = kill_one(of, number, rng.randint(-1 if of is not trials else 0, 4), rng.uniform(0, 0.2), rng)
+    strike = kill_one(of, number, rng.randint(-1 if of is not trials else 0, 3), rng.uniform(0, 0.2), rng)
     return Fault(f"{signal.Signals(number).name} of {of.__name__}, {case}", case, strike=strike, ranks=ranks_)
 
 
-@kind("trial_killed", 16, "SIGSEGV or SIGKILL of a trial (engine yade)")
+@kind("trial_killed", 12, "SIGSEGV or SIGKILL of a trial (engine yade)")
 def trial_killed(place, rng, k):
     return at_random(trials, (signal.SIGSEGV, signal.SIGKILL), ("yade",), place, rng, k)
 
 
-@kind("worker_killed", 12, "SIGSEGV or SIGKILL of a rank's worker")
+@kind("worker_killed", 8, "SIGSEGV or SIGKILL of a rank's worker")
 def worker_killed(place, rng, k):
     return at_random(workers, (signal.SIGSEGV, signal.SIGKILL), ("yade", "compact"), place, rng, k, 1 + k // 4 % 2)
 
 
-@kind("rank_killed", 12, "SIGSEGV or SIGKILL of a rank, of one or two")
+@kind("rank_killed", 8, "SIGSEGV or SIGKILL of a rank, of one or two")
 def rank_killed(place, rng, k):
     return at_random(ranks, (signal.SIGSEGV, signal.SIGKILL), ("yade", "compact"), place, rng, k, 1 + k // 4 % 2)
 
 
-@kind("ve_fails", 16, "a VE once raises, answers NaN, ends its process or dies of a signal")
+@kind("ve_fails", 8, "a VE once raises, answers NaN, ends its process or dies of a signal")
 def ve_fails(place, rng, k):
     what = ("raise", "nan", "exit", "segv", "kill", "memory", "print", "raise")[k % 8]
     return in_a_ve(place, rng, what, k)
 
 
-@kind("ve_hangs", 4, "a VE once sleeps or works for ever")
+@kind("ve_hangs", 2, "a VE once sleeps or works for ever")
 def ve_hangs(place, rng, k):
     return in_a_ve(place, rng, ("hang", "loop")[k % 2], k)
 
 
-@kind("ve_always_fails", 4, "from one trial on, VEs raise or answer NaN every time")
+@kind("ve_always_fails", 2, "from one trial on, VEs raise or answer NaN every time")
 def ve_always_fails(place, rng, k):
     return in_a_ve(place, rng, ("raise", "nan")[k % 2], k, always=True)
 
 
 def in_a_ve(place, rng, what, k, always=False):
-    mark = "always" if always else str(place.runs / "struck_once")
-    at = rng.randint(40, 300)  # of some 450 calls; the first ones are the template's own
+    mark = "always" if always else str(place.work / "struck_once")
+    at = rng.randint(40, 250)  # of some 400 calls; the first ones are the template's own
 
     def prepare(folder):
-        Path(place.runs / "struck_once").unlink(missing_ok=True)
+        Path(place.work / "struck_once").unlink(missing_ok=True)
 
     environment = {"PYTHONPATH": str(HOME / "hooks"), "FAULT_VE": f"{what} {at} {mark}"}
     return Fault(f"{what} at call {at}", "yade", environment=environment, prepare=prepare, cuts=what in ("raise", "nan", "memory"))
 
 
 def place_of(c):
-    short = ("ve.spheres=40", "control.end_time=0.1", c.cache, "ve.threads=1", "output.checkpoint_every=2")
-    cases = {"law": (HOME / "../../tests/program/batch_law.toml", ("control.end_time=0.2",)),
+    short = ("ve.spheres=40", "control.end_time=0.08", c.cache, "ve.threads=1", "output.checkpoint_every=2")
+    cases = {"law": (HOME / "../../tests/program/batch_law.toml", ("control.end_time=0.12",)),
              "compact": (HOME / "case.toml", (*short, 've.engine="compact"')),
              "yade": (HOME / "case.toml", (*short, 've.engine="yade"', "ve.sorted_contacts=true"))}
     place = injections.Place(c.program, c.runs, campaign.ENVIRONMENT, cases)
