@@ -195,6 +195,8 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
                 "one trial of compact cells in so many is repeated in YADE; 0: about 20 in a run"),
       parameter("threads", &V::threads, "", kNotNegative,
                 "of a rank, for compact cells; 0: the processors that it may use"),
+      parameter("balance", &V::balance, "", kAny,
+                "at checkpoints volume elements move to other ranks where that pays; the results are the same"),
       parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
                 "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
       word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),
@@ -391,11 +393,12 @@ const CaseSections& case_sections() {
                    .monitor = monitor_section(),
                    .path = path_section()};
     s.material_region = region_of(s.material, &RegionMaterial::region, &RegionMaterial::material, {"type"});
-    s.ve_region =
-        region_of(s.ve, &RegionVe::region, &RegionVe::ve,
-                  {"preset", "stiffness", "engine", "check_every", "threads", "sorted_contacts", "snapshot",
-                   "inertial_number", "answer", "mean_at", "min_steps", "start_at_rest", "hold_steps", "freeze_steps",
-                   "max_unbalanced_force", "seeds", "assignment", "assignment_seed", "cache"});
+    s.ve_region = region_of(s.ve, &RegionVe::region, &RegionVe::ve,
+                            {"preset",          "stiffness",  "engine",          "check_every",
+                             "threads",         "balance",    "sorted_contacts", "snapshot",
+                             "inertial_number", "answer",     "mean_at",         "min_steps",
+                             "start_at_rest",   "hold_steps", "freeze_steps",    "max_unbalanced_force",
+                             "seeds",           "assignment", "assignment_seed", "cache"});
     return s;
   }();
   return sections;

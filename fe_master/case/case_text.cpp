@@ -130,6 +130,7 @@ void forget_places(VeParameters& ve) {
   ve.scene = hash_text(read_file(ve.scene));
   ve.engine = {};
   ve.check_every = ve.threads = 0;
+  ve.balance = true;
   ve.sorted_contacts = false;
   ve.cache.clear();
 }

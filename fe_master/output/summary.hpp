@@ -24,6 +24,10 @@ struct Summary {
   double evaluate_seconds = 0;            ///< wall time inside MaterialPoints::evaluate
   double trial_seconds = 0;               ///< of the points' trials, summed over the ranks
   double engine_seconds = 0;              ///< of which inside the DEM engine's steps
+  double balance = 0;                     ///< ideal over actual time of the trials on the ranks, by counted cost
+  double imbalance_before = 0;            ///< busiest rank over the mean when points last moved; 0: they never did
+  double imbalance_after = 0;             ///< and then
+  long moved = 0;                         ///< points, in the whole run
   int checkpoints = 0;                    ///< written
   double checkpoint_seconds = 0;          ///< in all
   std::uint64_t checkpoint_bytes = 0;     ///< of the last file

@@ -1,11 +1,14 @@
 #include "volume_elements.hpp"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <exception>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -16,10 +19,13 @@
 namespace femxdem {
 namespace {
 
-enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, account, end };
+enum class Order : std::int32_t { add, begin_step, evaluate, commit, save, load, give, take, account, end };
 enum class Verdict : std::int32_t { done, user_error, error, more };
 
 constexpr int kTag = 0;
+
+constexpr double kMostlyDistinct = 0.9;    // of the points: where fewer histories differ, points share cells
+constexpr std::size_t kMovedAtOnce = 256;  // states that rank 0 holds while they move
 
 /// Waits without taking the processor from the workers: a rank may wait for seconds, and there may be more ranks than
 /// processors.
@@ -161,6 +167,24 @@ void load(LocalPoints& local, PacketReader input) {
   if (!points.empty()) local.load_into(points, input.get_text());
 }
 
+/// Input: places of points, ascending. Their states; the points are gone.
+std::string give(LocalPoints& local, PacketReader input) {
+  std::vector<std::size_t> places(input.get<std::size_t>());
+  PacketWriter output;
+  for (std::size_t& place : places) {
+    place = input.get<std::size_t>();
+    output.put(local.save_one(place));
+  }
+  for (auto place = places.rbegin(); place != places.rend(); ++place) local.remove(*place);
+  return output.take();
+}
+
+/// Input: states of further points.
+void take(LocalPoints& local, PacketReader input) {
+  const auto count = input.get<std::size_t>();
+  for (std::size_t i = 0; i < count; ++i) local.add(input.get_text(), 1);
+}
+
 std::string carry_out(Order order, const std::string& input, LocalPoints& local, MPI_Comm communicator) {
   PacketWriter output;
   switch (order) {
@@ -180,6 +204,11 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
     case Order::load:
       load(local, PacketReader(input));
       break;
+    case Order::give:
+      return give(local, PacketReader(input));
+    case Order::take:
+      take(local, PacketReader(input));
+      break;
     case Order::account: {
       const EngineCheck check = local.engine_check();
       output.put(local.peak_memory());
@@ -191,6 +220,19 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
       break;
   }
   return output.take();
+}
+
+/// Points of each rank, in order.
+std::vector<std::vector<std::size_t>> shares(const std::vector<int>& owner, int ranks) {
+  std::vector<std::vector<std::size_t>> points(static_cast<std::size_t>(ranks));
+  for (std::size_t p = 0; p < owner.size(); ++p) points[static_cast<std::size_t>(owner[p])].push_back(p);
+  return points;
+}
+
+/// Of one trial; 0 where a law makes no steps.
+double cost(const PointReport& report) {
+  const double steps = report["dem_steps"], contacts = report["contacts"];
+  return std::isfinite(steps) ? steps * (contacts > 1 ? contacts : 1) : 0;
 }
 
 /// The answer of a rank: verdict, then the output or the text of the exception.
@@ -249,11 +291,13 @@ VolumeElements::VolumeElements(MPI_Comm communicator, LocalPoints& local, const 
                                const std::vector<int>& template_of_point)
     : communicator_(communicator),
       local_(local),
-      owner_(assign(template_of_point.size(), size_of(communicator))),
+      shares_(shares(assign(template_of_point.size(), size_of(communicator)), size_of(communicator))),
+      latest_(template_of_point.size(), 0.0),
+      older_(template_of_point.size(), 0.0),
       histories_(std::span<const int>(template_of_point)),
       distinct_(template_of_point.size()) {
   std::vector<std::string> inputs;
-  for (const auto& points : points_of_ranks()) {
+  for (const auto& points : shares_) {
     PacketWriter packet;
     packet.put(templates.size());
     for (const std::string& state : templates) packet.put(state);
@@ -271,20 +315,13 @@ VolumeElements::VolumeElements(MPI_Comm communicator, LocalPoints& local, const 
 
 VolumeElements::~VolumeElements() { command(communicator_, Order::end, {}, local_); }
 
-std::vector<std::vector<std::size_t>> VolumeElements::points_of_ranks() const {
-  std::vector<std::vector<std::size_t>> points(static_cast<std::size_t>(size_of(communicator_)));
-  for (std::size_t p = 0; p < owner_.size(); ++p) points[static_cast<std::size_t>(owner_[p])].push_back(p);
-  return points;
-}
-
 void VolumeElements::begin_step() { command(communicator_, Order::begin_step, {}, local_); }
 
 std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
   if (F.size() != size()) throw std::invalid_argument("evaluate: one deformation gradient per point");
   const auto start = std::chrono::steady_clock::now();
-  const auto points = points_of_ranks();
   std::vector<std::string> inputs;
-  for (const auto& share : points) {
+  for (const auto& share : shares_) {
     PacketWriter packet;
     packet.put(static_cast<int>(wanted));
     for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
@@ -292,9 +329,9 @@ std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Opera
   }
   const std::vector<std::string> answers = command(communicator_, Order::evaluate, inputs, local_);
   std::vector<Response> responses(size());
-  for (std::size_t rank = 0; rank < points.size(); ++rank) {
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
     PacketReader packet(answers[rank]);
-    for (const std::size_t point : points[rank])
+    for (const std::size_t point : shares_[rank])
       responses[point] = get_response(packet, wanted != Operator::none, point);
     if (rank > 0) statistics_.bytes += inputs[rank].size() + answers[rank].size();
   }
@@ -311,18 +348,30 @@ void VolumeElements::count(const std::vector<Response>& responses, double second
     statistics_.dem_steps += response.report["dem_steps"];
     statistics_.trial_seconds += response.report["seconds"];
     statistics_.engine_seconds += response.report["engine_seconds"];
+    steps_ += response.report["dem_steps"];
   }
+  double busiest = 0;
+  for (const auto& share : shares_) {
+    double load = 0;
+    for (const std::size_t point : share) {
+      const double of_trial = cost(responses[point].report);
+      latest_[point] += of_trial;
+      load += of_trial;
+    }
+    busiest = std::max(busiest, load);
+    statistics_.cost += load;
+  }
+  statistics_.critical_cost += busiest;
 }
 
 void VolumeElements::commit() {
   const std::vector<std::string> answers = command(communicator_, Order::commit, {}, local_);
-  const auto points = points_of_ranks();
   reports_.clear();
-  for (std::size_t rank = 0; rank < points.size(); ++rank) {
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
     PacketReader packet(answers[rank]);
     if (packet.get<std::size_t>() == 0) continue;
     reports_.resize(size());
-    for (const std::size_t point : points[rank])
+    for (const std::size_t point : shares_[rank])
       packet.get_doubles(reports_[point].values.data(), reports_[point].values.size());
   }
   histories_.commit();
@@ -331,7 +380,7 @@ void VolumeElements::commit() {
 /// Rank 0 takes one state of each rank after each of its own: all work on their next one meanwhile. Who fails, a rank
 /// or the taker, does so after every rank has come to its end.
 void VolumeElements::save_each(const TakeState& take) {
-  const auto points = points_of_ranks();
+  const auto& points = shares_;
   std::exception_ptr failure;
   const auto pass_on = [&](std::size_t rank, const std::string& state, std::span<const std::size_t> of_rank) {
     std::vector<std::size_t> of_all;
@@ -380,7 +429,7 @@ void VolumeElements::load_each(const StateSource& states) {
   require_states_of(size(), states);
   std::vector<std::vector<std::pair<int, std::vector<std::size_t>>>> shares;
   std::size_t rounds = 0;
-  for (const auto& points : points_of_ranks()) {
+  for (const auto& points : shares_) {
     StateSource of_rank;
     for (const std::size_t p : points) of_rank.number_of_point.push_back(states.number_of_point[p]);
     shares.push_back(of_rank.points_of_states());
@@ -397,6 +446,84 @@ void VolumeElements::load_each(const StateSource& states) {
     command(communicator_, Order::load, inputs, local_);
   }
   histories_ = EqualHistories(std::span<const int>(states.number_of_point));
+}
+
+std::vector<int> VolumeElements::owners() const {
+  std::vector<int> owner(size());
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank)
+    for (const std::size_t point : shares_[rank]) owner[point] = static_cast<int>(rank);
+  return owner;
+}
+
+Balance VolumeElements::balance(bool may_move) {
+  const int ranks = size_of(communicator_);
+  const std::vector<int> now = owners();
+  const double price = kMoveSteps * std::accumulate(latest_.begin(), latest_.end(), 0.0) / std::max(steps_, 1.0);
+  const bool shared = static_cast<double>(distinct_) < kMostlyDistinct * static_cast<double>(size());
+  const std::vector<int> next = may_move && !shared ? rebalance(older_, latest_, now, ranks, price) : now;
+  std::vector<std::size_t> moving;
+  for (std::size_t p = 0; p < size(); ++p)
+    if (next[p] != now[p]) moving.push_back(p);
+  for (std::size_t first = 0; first < moving.size(); first += kMovedAtOnce)
+    move(std::span(moving).subspan(first, std::min(kMovedAtOnce, moving.size() - first)), next);
+  Balance balance{imbalance(loads(latest_, now, ranks)), imbalance(loads(latest_, next, ranks)), moving.size(),
+                  statistics_.efficiency(at_last_balance_, ranks),
+                  statistics_.clock_efficiency(at_last_balance_, ranks * local_.threads())};
+  if (!moving.empty()) statistics_.last_move = balance;
+  statistics_.moved += static_cast<long>(moving.size());
+  at_last_balance_ = statistics_;
+  for (std::size_t p = 0; p < size(); ++p) older_[p] = shared ? 0 : (older_[p] + latest_[p]) / 2;
+  std::fill(latest_.begin(), latest_.end(), 0.0);
+  steps_ = 0;
+  return balance;
+}
+
+std::string describe(const Balance& balance, std::size_t points) {
+  const std::string found = fmt::format(
+      "balance of the ranks since the last checkpoint: {:.3f} of ideal by counted cost, {:.3f} by the clock; {} of {} "
+      "points move",
+      balance.counted, balance.clocked, balance.moved, points);
+  if (balance.moved == 0) return found;
+  return found +
+         fmt::format(", the busiest rank has {:.3f} instead of {:.3f} of the mean", balance.after, balance.before);
+}
+
+/// Takes these points from their ranks to those of `owner`.
+void VolumeElements::move(std::span<const std::size_t> points, const std::vector<int>& owner) {
+  std::vector<std::vector<std::size_t>> given(shares_.size());
+  std::vector<std::string> inputs;
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+    std::vector<std::size_t> places, kept;
+    for (std::size_t place = 0; place < shares_[rank].size(); ++place) {
+      const std::size_t point = shares_[rank][place];
+      const bool goes = std::binary_search(points.begin(), points.end(), point);
+      if (goes) places.push_back(place);
+      (goes ? given[rank] : kept).push_back(point);
+    }
+    shares_[rank] = std::move(kept);
+    PacketWriter packet;
+    packet.put(places.size());
+    for (const std::size_t place : places) packet.put(place);
+    inputs.push_back(packet.take());
+  }
+  const std::vector<std::string> answers = command(communicator_, Order::give, inputs, local_);
+  std::vector<std::size_t> taken(shares_.size(), 0);
+  std::vector<PacketWriter> states(shares_.size());
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    for (const std::size_t point : given[rank]) {
+      const auto to = static_cast<std::size_t>(owner[point]);
+      states[to].put(packet.get_text());
+      shares_[to].push_back(point);
+      ++taken[to];
+    }
+  }
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+    PacketWriter packet;
+    packet.put(taken[rank]);
+    inputs[rank] = packet.take() + states[rank].take();
+  }
+  command(communicator_, Order::take, inputs, local_);
 }
 
 VolumeElements::Account VolumeElements::account() {

@@ -11,6 +11,16 @@
 
 namespace femxdem {
 
+/// What sharing the points out anew has found and done. Loads of the busiest rank over the mean.
+struct Balance {
+  double before = 1, after = 1;
+  std::size_t moved = 0;
+  double counted = 1, clocked = 1;  ///< ideal over actual time of the batches since the last time
+};
+
+/// As a sentence.
+std::string describe(const Balance& balance, std::size_t points);
+
 /// What the evaluations have cost so far.
 struct FarmStatistics {
   long batches = 0;           ///< calls of evaluate
@@ -20,10 +30,24 @@ struct FarmStatistics {
   double trial_seconds = 0;   ///< of the points' trials, summed
   double engine_seconds = 0;  ///< of which inside the DEM engine's steps
   std::uint64_t bytes = 0;    ///< sent between the ranks by evaluate
+  double cost = 0;            ///< of all trials: DEM steps x contacts
+  double critical_cost = 0;   ///< of the busiest rank of each batch, summed
+  long moved = 0;             ///< points that went to another rank
+  Balance last_move;
+
+  /// Ideal over actual time of the batches since then, by cost and by the clock; 1 where there were none.
+  double efficiency(const FarmStatistics& then, int ranks) const {
+    const double spent = ranks * (critical_cost - then.critical_cost);
+    return spent > 0 ? (cost - then.cost) / spent : 1;
+  }
+  double clock_efficiency(const FarmStatistics& then, int processors) const {
+    const double spent = processors * (seconds - then.seconds);
+    return spent > 0 ? (trial_seconds - then.trial_seconds) / spent : 1;
+  }
 };
 
 /// The points of all ranks as one batch, on rank 0. Every rank, 0 included, serves its own share; the others are in
-/// serve() until this object is destroyed. Results do not depend on the number of ranks.
+/// serve() until this object is destroyed. Results do not depend on the number of ranks, nor on who serves which point.
 ///
 /// An exception on one rank never skips a collective: it travels to rank 0 as a value and is thrown there, once all
 /// ranks have answered, as UserError if it was one and std::runtime_error otherwise, with the rank's number.
@@ -37,7 +61,7 @@ class VolumeElements : public MaterialPoints {
   VolumeElements(const VolumeElements&) = delete;
   VolumeElements& operator=(const VolumeElements&) = delete;
 
-  std::size_t size() const override { return owner_.size(); }
+  std::size_t size() const override { return latest_.size(); }
   std::size_t distinct() const override { return distinct_; }
   void begin_step() override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
@@ -46,6 +70,12 @@ class VolumeElements : public MaterialPoints {
   /// Ranks hand over one state after another, rank 0 holds one of each.
   void save_each(const TakeState& take) override;
   void load_each(const StateSource& states) override;
+
+  /// Directly after save(): shares the points out by what each has cost, where that pays (rebalance); costs since the
+  /// last time are the latest, older ones count half each time. The cost is counted (DEM steps x contacts), not
+  /// measured: it repeats. Points with equal histories may share one cell as long as they are on one rank: while more
+  /// than a tenth of them do, all stay where they are, as they do without may_move.
+  Balance balance(bool may_move = true);
 
   const FarmStatistics& statistics() const { return statistics_; }
   /// Sums over the ranks of what LocalPoints count. Collective with serve().
@@ -56,16 +86,19 @@ class VolumeElements : public MaterialPoints {
   Account account();
 
  private:
-  std::vector<std::vector<std::size_t>> points_of_ranks() const;
   void count(const std::vector<Response>& responses, double seconds);
+  std::vector<int> owners() const;
+  void move(std::span<const std::size_t> points, const std::vector<int>& owner);
 
   MPI_Comm communicator_;
   LocalPoints& local_;
-  std::vector<int> owner_;            ///< rank of each point
-  std::vector<PointReport> reports_;  ///< of the last commit
+  std::vector<std::vector<std::size_t>> shares_;  ///< points of each rank, in its order
+  std::vector<double> latest_, older_;            ///< costs of each point since the last balance(), and before
+  double steps_ = 0;                              ///< DEM steps since then
+  std::vector<PointReport> reports_;              ///< of the last commit
   EqualHistories histories_;
   std::size_t distinct_ = 0;
-  FarmStatistics statistics_;
+  FarmStatistics statistics_, at_last_balance_;
 };
 
 /// Serves the local points of a rank other than 0 until rank 0 destroys its VolumeElements.

@@ -102,11 +102,17 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
   options.ranks = mpi.size;
   const auto local = local_points(prepared.engine);
   VolumeElements points(MPI_COMM_WORLD, *local, prepared.states, pool.template_of_point);
+  if (mpi.size > 1) options.at_checkpoint = [&] { return describe(points.balance(ve.balance), points.size()); };
   options.complete = [&](Summary& summary) {
     const VolumeElements::Account account = points.account();
-    summary.evaluate_seconds = points.statistics().seconds;
-    summary.trial_seconds = points.statistics().trial_seconds;
-    summary.engine_seconds = points.statistics().engine_seconds;
+    const FarmStatistics& statistics = points.statistics();
+    summary.evaluate_seconds = statistics.seconds;
+    summary.trial_seconds = statistics.trial_seconds;
+    summary.engine_seconds = statistics.engine_seconds;
+    summary.balance = statistics.efficiency({}, mpi.size);
+    summary.imbalance_before = statistics.last_move.before;
+    summary.imbalance_after = statistics.last_move.after;
+    summary.moved = statistics.moved;
     summary.peak_memory_workers = account.peak_memory;
     summary.threads = local->threads();
     summary.engine = name_of(prepared.engine);

@@ -30,6 +30,8 @@ struct RunOptions {
   std::shared_ptr<FolderLock> lock;   ///< of the folder where it is prepared already
   std::optional<Moment> ends_before;  ///< the process must have ended by then
   std::optional<bool> progress;       ///< see Log
+  /// After a checkpoint: shares the points out anew; returns what the log says of it, mostly nothing.
+  std::function<std::string()> at_checkpoint = [] { return std::string(); };
   std::function<void(Summary&)> complete = [](Summary&) {};  ///< adds what the farm knows
 };
 

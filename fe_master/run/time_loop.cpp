@@ -211,7 +211,10 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   reuse_of_step_ = {};
   if (files_.summary.steps % case_.output.every == 0) write_fields();
   keep_state();
-  if (checkpoint_due()) write_state();
+  if (checkpoint_due()) {
+    write_state();
+    if (const std::string done = options_.at_checkpoint(); !done.empty()) files_.log.note(done);
+  }
   files_.whole(now.time);
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <mpi.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>
@@ -48,6 +49,15 @@ Farm::Farm(Law law, const std::vector<std::string>& templates, const std::vector
   points = std::make_unique<VolumeElements>(MPI_COMM_WORLD, *local, templates, template_of_point);
 }
 
+Farm::~Farm() {
+  points.reset();
+  leave(*local);
+}
+
+void leave(LocalPoints& local) {
+  while (local.size() > 0) local.remove(local.size() - 1);
+}
+
 PathLengthPoints::State PathLengthPoints::state_of(const std::string& bytes) {
   State state;
   if (bytes.size() != sizeof state) throw UserError("not a state of a path-length point");
@@ -86,7 +96,7 @@ Response PathLengthPoints::respond(std::size_t index, const Tensor2& F, Operator
   const Tensor2 I = Tensor2::Identity();
   response.stress = rotate(Tensor2(state.modulus * (U - I) + 0.1 * state.modulus * state.length * I), R);
   if (wanted == Operator::elastic) response.stiffness = rotate(isotropic_stiffness(0, state.modulus / 2), R);
-  response.report["dem_steps"] = 7;
+  response.report["dem_steps"] = 7 * std::max(1.0, state.modulus / 1e8);
   return response;
 }
 
@@ -125,6 +135,7 @@ int main(int argc, char** argv) {
     for (int law = announce(0); law != kNoMore; law = announce(0)) {
       const auto local = make_local(static_cast<Law>(law));
       serve(MPI_COMM_WORLD, *local);
+      leave(*local);
     }
   }
   MPI_Finalize();

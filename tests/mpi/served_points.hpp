@@ -9,8 +9,8 @@
 namespace femxdem {
 
 /// Elastic cell whose stress also depends on the length of its path: sigma = R (E (U - I) + H s I) R^T, s the sum of
-/// |U - U_n|. A gradient with F_22 above 10 throws on the rank that holds the point, as does saving
-/// one whose path is longer than 10.
+/// |U - U_n|. A trial counts 7 DEM steps, or more with more than 1e8 Pa in proportion. A gradient with F_22 above 10
+/// throws on the rank that holds the point, as does saving one whose path is longer than 10.
 class PathLengthPoints : public LocalPoints {
  public:
   void add(const std::string& state, std::size_t count) override;
@@ -45,9 +45,13 @@ enum class Law : int { path_length, dummy_engine };
 /// The farm on rank 0: tells the other ranks which law to serve and constructs the points on all of them.
 struct Farm {
   Farm(Law law, const std::vector<std::string>& templates, const std::vector<int>& template_of_point);
+  ~Farm();
   std::unique_ptr<LocalPoints> local;
   std::unique_ptr<VolumeElements> points;
 };
+
+/// Removes all points: a worker is empty when the next test adds its own.
+void leave(LocalPoints& local);
 
 /// The worker of this rank, started before MPI_Init.
 WorkerProcess& worker_of_this_rank();

@@ -15,7 +15,8 @@ using contract::gradients;
 using contract::part;
 using contract::trial;
 
-const std::vector<std::string> kTemplates = {PathLengthPoints::at_rest(1e8), PathLengthPoints::at_rest(3e7)};
+const std::vector<std::string> kTemplates = {PathLengthPoints::at_rest(1e8), PathLengthPoints::at_rest(3e7),
+                                             PathLengthPoints::at_rest(1e9)};
 const std::vector<int> kSeven = {0, 0, 1, 0, 1, 1, 0};
 
 int ranks() {
@@ -35,6 +36,20 @@ TEST(Schedule, Cyclic) {
   EXPECT_EQ(assign(5, 2), (std::vector<int>{0, 1, 0, 1, 0}));
   EXPECT_EQ(assign(2, 4), (std::vector<int>{0, 1}));
   EXPECT_THROW(assign(2, 0), std::invalid_argument);
+}
+
+/// Points whose trials cost ten times as much where the cyclic assignment puts them on rank 0.
+std::vector<int> heavy_on_rank_0(std::size_t points) {
+  std::vector<int> heavy(points, 0);
+  for (std::size_t p = 0; p < points; p += static_cast<std::size_t>(ranks())) heavy[p] = 2;
+  return heavy;
+}
+
+/// No two alike.
+std::vector<Tensor2> distinct_gradients(std::size_t points, double strain) {
+  std::vector<Tensor2> F = gradients(points, strain);
+  for (std::size_t p = 0; p < points; ++p) F[p](0, 0) += 1e-2 * strain * static_cast<double>(p);
+  return F;
 }
 
 TEST(VolumeElements, Contract) {
@@ -77,6 +92,71 @@ TEST(VolumeElements, SameBitsWithWorkers) {
       EXPECT_EQ(reports[i]["mean_rotation"], reference.reports()[i]["mean_rotation"]) << "point " << i;
   }
   EXPECT_GT(farm.points->account().peak_memory, static_cast<std::uint64_t>(ranks()) << 20);
+  leave(reference);
+}
+
+TEST(VolumeElements, PointsMoveToIdleRanksAndTheBitsStay) {
+  const std::vector<int> points = heavy_on_rank_0(40);
+  Farm farm(Law::path_length, kTemplates, points);
+  PathLengthPoints reference = in_one_place(points);
+  const auto F = distinct_gradients(points.size(), 1e-2);
+  std::vector<double> balances;
+  for (const double fraction : {0.3, 0.6, 0.5, 1.0}) {
+    for (int trials = 0; trials < 20; ++trials) farm.points->evaluate(part(F, 0.7 * fraction), Operator::none);
+    expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
+    farm.points->commit();
+    reference.commit();
+    EXPECT_EQ(farm.points->save(), reference.save());
+    const Balance balance = farm.points->balance();
+    balances.push_back(balance.counted);
+    const bool second = fraction == 0.6;
+    EXPECT_EQ(balance.moved > 0, second && ranks() > 1) << "the first knows too little, later ones find it balanced";
+    if (!second || ranks() == 1) continue;
+    EXPECT_GT(balance.before, 1.5);
+    EXPECT_LT(balance.after, 1.05);
+    EXPECT_EQ(farm.points->statistics().moved, static_cast<long>(balance.moved));
+  }
+  if (ranks() == 1) return;
+  EXPECT_LT(balances[1], 1 / 1.5);
+  EXPECT_GT(balances[2], 1 / 1.05);
+  EXPECT_EQ(balances[3], balances[2]);
+}
+
+TEST(VolumeElements, PointsStayWhereMovingCostsMoreThanItSavesAndWhereTheyShareHistories) {
+  const std::vector<int> points = heavy_on_rank_0(40);
+  Farm farm(Law::path_length, kTemplates, points);
+  const auto moved = [&](int trials, const std::vector<Tensor2>& F) {
+    for (int k = 0; k < trials; ++k) farm.points->evaluate(F, Operator::none);
+    return farm.points->balance().moved;
+  };
+  const std::vector<Tensor2> distinct = distinct_gradients(points.size(), 1e-2);
+  EXPECT_EQ(moved(1, distinct), 0u);
+  EXPECT_EQ(moved(1, distinct), 0u) << "one trial is too few to pay";
+  const std::vector<Tensor2> equal(points.size(), distinct[0]);
+  EXPECT_EQ(moved(20, equal), 0u);
+  EXPECT_EQ(moved(20, equal), 0u) << "points with equal histories may share a cell";
+}
+
+TEST(VolumeElements, MovedWorkersKeepTheirBits) {
+  PythonVolumeElements reference(worker_for_comparison(), {});
+  const std::vector<std::string> templates = {reference.make_template("{}").state};
+  const std::vector<int> points(12, 0);
+  reference.add(templates[0], points.size());
+  Farm farm(Law::dummy_engine, templates, points);
+  auto F = distinct_gradients(points.size(), 1e-3);
+  for (std::size_t p = 0; p < points.size(); p += static_cast<std::size_t>(ranks()))
+    F[p] = part({F[p]}, 20)[0];  // twenty times the steps
+  std::size_t moved = 0;
+  for (const double fraction : {0.3, 0.6, 0.5, 1.0}) {
+    for (int trials = 0; trials < 5; ++trials) farm.points->evaluate(part(F, fraction), Operator::none);
+    expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
+    farm.points->commit();
+    reference.commit();
+    EXPECT_EQ(farm.points->save(), reference.save());
+    moved += farm.points->balance().moved;
+  }
+  EXPECT_EQ(moved > 0, ranks() > 1);
+  leave(reference);
 }
 
 TEST(VolumeElements, AnExceptionOnARankTravelsAndTheFarmGoesOn) {
