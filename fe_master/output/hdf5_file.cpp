@@ -79,6 +79,11 @@ Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file), 
 
 Hdf5File::~Hdf5File() {
   if (id_ >= 0 && !broken_) H5Fclose(id_);
+  if (mode_ != Mode::update) return;
+  try {
+    undo_unfinished_update(file_);   // there is none after finish()
+  } catch (const std::exception&) {  // left to the next update
+  }
 }
 
 void Hdf5File::reserve(std::uint64_t bytes, std::size_t data_sets) {
@@ -184,7 +189,8 @@ Shape Hdf5File::shape(const std::string& path) const {
 /// Number of values; a file that is damaged may claim more than it holds.
 std::size_t Hdf5File::count(const std::string& path, const Shape& lengths) const {
   const double claimed = std::accumulate(lengths.begin(), lengths.end(), 1.0, std::multiplies<>());
-  if (claimed > static_cast<double>(std::filesystem::file_size(file_))) fail("more values than the file has bytes", path);
+  if (claimed > static_cast<double>(std::filesystem::file_size(file_)))
+    fail("more values than the file has bytes", path);
   return static_cast<std::size_t>(claimed);
 }
 

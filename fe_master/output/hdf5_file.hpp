@@ -19,8 +19,8 @@ struct Hdf5Error : std::runtime_error {
 
 /// An HDF5 file, open as long as the object lives. A failure to read is an Hdf5Error that names file and data set, one
 /// to write a DiskError with the system's reason; HDF5 does not survive a full disk, so space is reserved before. Paths
-/// inside the file start with '/'; missing groups on the way are made. An update that does not come to finish(), in
-/// whatever way, is undone by the next one (undo_driver.hpp).
+/// inside the file start with '/'; missing groups on the way are made. An update that does not come to finish() is
+/// undone: at the end of the object or, where the process was killed, by the next update (undo_driver.hpp).
 class Hdf5File {
  public:
   /// create truncates; read and update want an existing file

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -27,15 +28,18 @@ void remove_results(const fs::path& folder) {
   for (const char* name : kFilesOfARun) fs::remove(folder / name);
 }
 
-/// Files that a run wrote beside its own (replace_file) when it was killed.
+/// Files that a run wrote beside its own (replace_file, FolderLock) when it was killed.
 void remove_leftovers(const fs::path& folder) {
   constexpr std::size_t kSuffix = 7;  // .XXXXXX
+  constexpr std::string_view kLock = "running.lock.";
   std::vector<fs::path> leftovers;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    for (const std::string_view file : kFilesOfARun)
-      if (name.size() == file.size() + kSuffix && name.starts_with(std::string(file) + "."))
-        leftovers.push_back(entry.path());
+    const bool lock = name.starts_with(kLock) && !fs::exists("/proc/" + name.substr(kLock.size()));
+    const bool other = std::any_of(kFilesOfARun.begin(), kFilesOfARun.end(), [&](const std::string& file) {
+      return name.size() == file.size() + kSuffix && name.starts_with(file + ".");
+    });
+    if (lock || other) leftovers.push_back(entry.path());
   }
   for (const fs::path& leftover : leftovers) fs::remove(leftover);
 }

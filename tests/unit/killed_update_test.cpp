@@ -113,6 +113,16 @@ class KilledUpdate : public OwnFolder {
   fs::path file_ = folder_ / "results.h5";
 };
 
+TEST_F(KilledUpdate, OneThatIsGivenUpIsUndoneAtOnce) {
+  const std::string before = bytes_of(file_);
+  {
+    Hdf5File file(file_, Mode::update);
+    file.write("/given_up", std::vector<double>(1000, 1.0), {1000});
+  }
+  EXPECT_EQ(bytes_of(file_), before);
+  EXPECT_FALSE(fs::exists(undo_file(file_)));
+}
+
 TEST_F(KilledUpdate, OfANewStepIsUndone) {
   for (const bool half : {false, true}) {
     const int step = kSteps + half;

@@ -107,7 +107,7 @@ def same_bits(folder, reference):
 
 def strays(folder):
     """Files that no run is to leave."""
-    whole = {"case.toml", "checkpoint.h5", "history.csv", "log.txt", "results.h5", "results.xdmf", "summary.json"}
+    whole = {"case.toml", "checkpoint.h5", "checkpoint.previous.h5", "history.csv", "log.txt", "results.h5", "results.xdmf", "summary.json"}
     return sorted(file.name for file in folder.iterdir() if file.name not in whole)
 
 
