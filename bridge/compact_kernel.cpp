@@ -259,6 +259,31 @@ FEMXDEM_INLINE std::size_t cohesive(const CompactArrays& a, const CompactCellMot
   return lost_count;
 }
 
+/// What W contacts answer with: normal force, the same as a vector, shear force, and whether they end.
+template <int W>
+struct Answers {
+  Vec<W> normal_force;
+  Vec3<W> N, shear;
+  Vec<W> ends;
+};
+
+/// Pushes the spheres at the middle of the overlap and keeps the forces; returns the number of contacts that end.
+template <int W>
+FEMXDEM_INLINE std::size_t act(const CompactArrays& a, std::size_t at, const Pairs<W>& p, const Answers<W>& r,
+                               std::uint32_t* lost) {
+  const Vec<W> zero{};
+  Vec3<W> f = -r.N - r.shear;
+  f = {either(r.ends, zero, f.x), either(r.ends, zero, f.y), either(r.ends, zero, f.z)};
+  const Vec3<W> t = cross(p.normal, f);
+  const Vec<W> half = 0.5 * p.overlap;
+  const Wrenches<W> on_i(f, scaled<W>(p.i.radius() - half, t)), on_j(-f, scaled<W>(p.j.radius() - half, t));
+  push<W>(a, at, on_i, on_j);
+  store(a.normal_force + at, r.normal_force);
+  store3<W>(a.shear, at, r.shear);
+  store3<W>(a.normal, at, p.normal);
+  return any<W>(r.ends) ? note<W>(a, at, r.ends, lost) : 0;
+}
+
 template <int W>
 FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMotion& cell, std::uint32_t* lost) {
   std::size_t lost_count = 0;
@@ -273,16 +298,7 @@ FEMXDEM_INLINE std::size_t friction(const CompactArrays& a, const CompactCellMot
     const Vec<W> limit = dot(N, N) * (c.tangent * c.tangent), size = dot(p.shear, p.shear);
     const Vec<W> ratio = square_root(limit) / square_root(size);
     const Vec3<W> shear = scaled<W>(size > limit ? ratio : splat<W>(1.0), p.shear);
-    Vec3<W> f = -N - shear;
-    f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
-    const Vec3<W> t = cross(p.normal, f);
-    const Vec<W> half = 0.5 * p.overlap;
-    const Wrenches<W> on_i(f, scaled<W>(p.i.radius() - half, t)), on_j(-f, scaled<W>(p.j.radius() - half, t));
-    push<W>(a, at, on_i, on_j);
-    store(a.normal_force + at, normal_force);
-    store3<W>(a.shear, at, shear);
-    store3<W>(a.normal, at, p.normal);
-    if (any<W>(ends)) lost_count += note<W>(a, at, ends, lost + lost_count);
+    lost_count += act<W>(a, at, p, {normal_force, N, shear, ends}, lost + lost_count);
   }
   return lost_count;
 }
@@ -314,16 +330,7 @@ FEMXDEM_INLINE std::size_t paper(const CompactArrays& a, const CompactCellMotion
     const Vec<W> normal_force = repulsion - c.adhesion;
     const Vec<W> limit = repulsion * c.tangent, size = square_root(dot(p.shear, p.shear));
     const Vec3<W> shear = scaled<W>(size > limit ? limit / size : splat<W>(1.0), p.shear);
-    Vec3<W> f = -scaled<W>(normal_force, p.normal) - shear;
-    f = {either(ends, zero, f.x), either(ends, zero, f.y), either(ends, zero, f.z)};
-    const Vec3<W> t = cross(p.normal, f);
-    const Vec<W> half = 0.5 * p.overlap;
-    const Wrenches<W> on_i(f, scaled<W>(p.i.radius() - half, t)), on_j(-f, scaled<W>(p.j.radius() - half, t));
-    push<W>(a, at, on_i, on_j);
-    store(a.normal_force + at, normal_force);
-    store3<W>(a.shear, at, shear);
-    store3<W>(a.normal, at, p.normal);
-    if (any<W>(ends)) lost_count += note<W>(a, at, ends, lost + lost_count);
+    lost_count += act<W>(a, at, p, {normal_force, scaled<W>(normal_force, p.normal), shear, ends}, lost + lost_count);
   }
   return lost_count;
 }

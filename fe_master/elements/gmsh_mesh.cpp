@@ -175,9 +175,10 @@ void add_sides_of_curve(int group, const std::string& name, const std::string& f
       for (const std::size_t end : {lines.nodes[3 * l], lines.nodes[3 * l + 1]})
         if (number.count(end) > 0) ends.insert(number.at(end));
       if (ends != std::set<int>{side.nodes[0], side.nodes[2]})
-        throw UserError(fmt::format("{}: line {} of physical curve '{}' has the middle of an element's side but not its "
-                                    "ends; open the mesh in Gmsh and export it again",
-                                    file, lines.tags[l], name));
+        throw UserError(
+            fmt::format("{}: line {} of physical curve '{}' has the middle of an element's side but not its "
+                        "ends; open the mesh in Gmsh and export it again",
+                        file, lines.tags[l], name));
       const bool known = std::any_of(sides.begin(), sides.end(), [&](const Side& s) { return s.nodes == side.nodes; });
       if (!known) sides.push_back(side);
     }
@@ -281,8 +282,9 @@ void refuse_what_ends_gmsh(const std::string& file) {
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFSIGNALED(status))
-    throw UserError(fmt::format("{}: Gmsh cannot read it (its library ends with signal {}, {}); open it in Gmsh and export it again",
-                                file, WTERMSIG(status), strsignal(WTERMSIG(status))));
+    throw UserError(fmt::format(
+        "{}: Gmsh cannot read it (its library ends with signal {}, {}); open it in Gmsh and export it again", file,
+        WTERMSIG(status), strsignal(WTERMSIG(status))));
 }
 
 }  // namespace

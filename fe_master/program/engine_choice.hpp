@@ -30,7 +30,8 @@ struct PreparedRun {
   std::vector<std::string> states;
   EngineKind engine = EngineKind::yade;
 };
-/// Takes or makes the volume elements of the pool and chooses the engine that `ve` asks for. What there is to say goes to the terminal and to the options' remarks, versions to theirs.
+/// Takes or makes the volume elements of the pool and chooses the engine that `ve` asks for. What there is to say goes
+/// to the terminal and to the options' remarks, versions to theirs.
 PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vector<VeParameters> pool,
                         RunOptions& options);
 

@@ -256,7 +256,8 @@ int main(int argc, char** argv) {
     std::cerr << error.what() << "\n";
     return kNotWritten;
   } catch (const std::bad_alloc&) {
-    std::cerr << "femxdem: the system gives no more memory; use fewer ranks on this machine, or raise its limit (ulimit -v), and "
+    std::cerr << "femxdem: the system gives no more memory; use fewer ranks on this machine, or raise its limit "
+                 "(ulimit -v), and "
                  "--restart from the last checkpoint\n";
     return kPointFailed;
   } catch (const std::exception& error) {

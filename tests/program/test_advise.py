@@ -16,6 +16,13 @@ SCRIPT = (CASES / "scripts/triaxial.py").read_text().format(
     ready="O.pause()", run="O.run(60000, True)", end="",
 )
 CASE = """# mine
+load = [
+  { edge = "bottom", kind = "displacement", component = "y", value = 0.0 },
+  { edge = "top", kind = "displacement", component = "y", value = -0.1 },
+  { point = [0.5, 0.0], kind = "displacement", component = "x", value = 0.0 },
+  { edge = "left", kind = "pressure", value = 1e5 },
+  { edge = "right", kind = "pressure", value = 1e5 },
+]
 [mesh]
 type = "rectangle"
 width = 1.0
@@ -32,34 +39,6 @@ script = "theirs.py" # beside the case
 confining_stress = 1e5
 inertial_number = 2e-2
 max_unbalanced_force = 0.5
-
-[[load]]
-edge = "bottom"
-kind = "displacement"
-component = "y"
-value = 0.0
-
-[[load]]
-edge = "top"
-kind = "displacement"
-component = "y"
-value = -0.1
-
-[[load]]
-point = [0.5, 0.0]
-kind = "displacement"
-component = "x"
-value = 0.0
-
-[[load]]
-edge = "left"
-kind = "pressure"
-value = 1e5
-
-[[load]]
-edge = "right"
-kind = "pressure"
-value = 1e5
 
 [control]
 end_time = 1.0
