@@ -156,7 +156,7 @@ def inject(place, fault):
     clean = Fault(fault.name, fault.case, settings=fault.settings, ranks=fault.ranks)
     existing = ["--restart"] if (folder / "checkpoint.h5").exists() else ["--overwrite"]
     again = subprocess.run(place.command(clean, folder, existing), env=place.environment, capture_output=True, text=True, timeout=LONGEST)
-    if fault.destroys and again.returncode == 2:
+    if fault.destroys and again.returncode in (2, 5):  # 5: "has been removed or changed"
         return {**seen, "way": "noticed", "differs": "", "restart": (again.stdout + again.stderr).strip()[-300:]}
     if again.returncode != 0:
         last = (again.stdout + again.stderr).strip().splitlines()[-1:]
