@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
 #include "errors.hpp"
+#include "hash.hpp"
 
 namespace femxdem {
 namespace {
@@ -76,22 +78,16 @@ void clear_padding(const CompactArrays& a) {
   std::fill(a.pairs + h.pairs, a.pairs + h.pair_capacity, CompactPair{});
 }
 
-/// FNV-1a over words of eight bytes in four lanes; the checksum's own place counts as zero.
+/// Of a saved block; the checksum's own place counts as zero.
 std::uint64_t checksum(std::string_view bytes) {
-  constexpr std::uint64_t kPrime = 0x100000001b3ULL;
-  std::array<std::uint64_t, 4> lanes = {0xcbf29ce484222325ULL, 1, 2, 3};
-  const std::size_t words = bytes.size() / 8;
-  for (std::size_t k = 0; k < words; ++k) {
-    std::uint64_t word;
-    std::memcpy(&word, bytes.data() + 8 * k, 8);
-    if (8 * k == offsetof(CompactHeader, checksum)) word = 0;
-    std::uint64_t& lane = lanes[k % 4];
-    lane = (lane ^ word) * kPrime;
-    lane ^= lane >> 29;
-  }
-  std::uint64_t sum = bytes.size();
-  for (const std::uint64_t lane : lanes) sum = (sum ^ lane) * kPrime;
-  return sum ^ sum >> 32;
+  constexpr std::size_t kPlace = offsetof(CompactHeader, checksum);
+  static_assert(kPlace % 8 == 0);
+  constexpr std::array<char, 8> kZero{};
+  Checksum sum;
+  sum.add(bytes.substr(0, kPlace));
+  sum.add({kZero.data(), kZero.size()});
+  sum.add(bytes.substr(kPlace + kZero.size()));
+  return sum.value();
 }
 
 /// Indices that point outside of their arrays would be read in every step.

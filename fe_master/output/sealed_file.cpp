@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <string_view>
 #include <vector>
 
 #include "disk_file.hpp"
+#include "hash.hpp"
 
 namespace femxdem {
 namespace {
@@ -19,32 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kMark = "femxdem: whole 2";  // 16 bytes, the format's version at the end
 constexpr std::size_t kPiece = std::size_t{1} << 20;
-
-/// FNV-1a over words of eight bytes in four lanes, which are independent of each other and so as fast as memory.
-class Checksum {
- public:
-  /// `size`: a multiple of 32, but for the last piece.
-  void add(const char* bytes, std::size_t size) {
-    for (std::size_t at = 0; at < size; at += 8) {
-      std::uint64_t word = 0;
-      std::memcpy(&word, bytes + at, std::min<std::size_t>(8, size - at));
-      std::uint64_t& lane = lanes_[at / 8 % lanes_.size()];
-      lane = (lane ^ word) * kPrime;
-      lane ^= lane >> 29;
-    }
-    size_ += size;
-  }
-  std::uint64_t value() const {
-    std::uint64_t sum = size_;
-    for (const std::uint64_t lane : lanes_) sum = (sum ^ lane) * kPrime;
-    return sum ^ sum >> 32;
-  }
-
- private:
-  static constexpr std::uint64_t kPrime = 0x100000001b3ULL;
-  std::array<std::uint64_t, 4> lanes_ = {0xcbf29ce484222325ULL, 1, 2, 3};
-  std::uint64_t size_ = 0;
-};
 
 struct Seal {
   std::array<char, kMark.size()> mark{};
@@ -59,7 +33,7 @@ std::uint64_t checksum_of(const fs::path& file, std::uint64_t size) {
   Checksum sum;
   for (std::uint64_t done = 0; done < size && stream;) {
     stream.read(piece.data(), static_cast<std::streamsize>(std::min<std::uint64_t>(kPiece, size - done)));
-    sum.add(piece.data(), static_cast<std::size_t>(stream.gcount()));
+    sum.add({piece.data(), static_cast<std::size_t>(stream.gcount())});
     done += static_cast<std::uint64_t>(stream.gcount());
   }
   return sum.value();
