@@ -84,7 +84,8 @@ void AppendedFile::open_again() {
 }
 
 void replace_file(const fs::path& file, std::string_view text) {
-  std::string beside = file.string() + ".XXXXXX";  // of this process: another one may write the same file of a cache
+  std::string beside = file.string();
+  beside += kBeside;  // of this process: another one may write the same file of a cache
   const int descriptor = mkostemp(beside.data(), O_CLOEXEC);
   if (descriptor < 0) fail(file, errno);
   const mode_t mask = umask(0);

@@ -6,9 +6,12 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <system_error>
+#include <vector>
 
 #include "errors.hpp"
 
@@ -63,9 +66,25 @@ bool is_over(const Owner& owner) {
   return start.empty() || start != owner.start;
 }
 
+/// Where a process writes its lock before it appears, and where it puts one that it takes over.
+fs::path beside_of(const fs::path& file, long process) { return fmt::format("{}.{}", file.string(), process); }
+
+/// What processes that were killed have left there.
+void remove_leftovers(const fs::path& file) {
+  const std::string prefix = file.filename().string() + ".";
+  std::vector<fs::path> leftovers;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(file.parent_path(), ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(prefix) && start_of(std::atol(name.c_str() + prefix.size())).empty())
+      leftovers.push_back(entry.path());
+  }
+  for (const fs::path& leftover : leftovers) fs::remove(leftover, ignored);
+}
+
 /// Creates the lock; false when there is one. It appears with its text: it is written beside and linked.
 bool create(const fs::path& file, const Owner& owner) {
-  const std::string beside = fmt::format("{}.{}", file.string(), owner.process);
+  const fs::path beside = beside_of(file, owner.process);
   const int descriptor = open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   const std::string text = fmt::format("{} {} {} {}\n", owner.host, owner.boot, owner.process, owner.start);
   const bool written =
@@ -102,12 +121,12 @@ FolderLock::FolderLock(const fs::path& folder) : file_(fs::absolute(folder) / "r
     }
     remark_ =
         fmt::format("{}: taken over from process {}, which ended without leaving it", folder.string(), other.process);
-    fs::path mine = file_;
-    mine += fmt::format(".{}", me.process);
+    const fs::path mine = beside_of(file_, me.process);
     std::error_code moved;
     fs::rename(file_, mine, moved);  // of two that take over, one moves it
     if (!moved) fs::remove(mine, moved);
   }
+  remove_leftovers(file_);
   if (file_.string().size() < held_file.size()) std::strcpy(held_file.data(), file_.c_str());
 }
 

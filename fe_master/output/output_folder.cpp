@@ -13,6 +13,7 @@
 #include <system_error>
 #include <vector>
 
+#include "disk_file.hpp"
 #include "errors.hpp"
 
 namespace femxdem {
@@ -28,18 +29,15 @@ void remove_results(const fs::path& folder) {
   for (const char* name : kFilesOfARun) fs::remove(folder / name);
 }
 
-/// Files that a run wrote beside its own (replace_file, FolderLock) when it was killed.
+/// Files that a run wrote beside its own (replace_file) when it was killed.
 void remove_leftovers(const fs::path& folder) {
-  constexpr std::size_t kSuffix = 7;  // .XXXXXX
-  constexpr std::string_view kLock = "running.lock.";
   std::vector<fs::path> leftovers;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    const bool lock = name.starts_with(kLock) && !fs::exists("/proc/" + name.substr(kLock.size()));
-    const bool other = std::any_of(kFilesOfARun.begin(), kFilesOfARun.end(), [&](const std::string& file) {
-      return name.size() == file.size() + kSuffix && name.starts_with(file + ".");
+    const bool beside = std::any_of(kFilesOfARun.begin(), kFilesOfARun.end(), [&](const std::string& file) {
+      return name.size() == file.size() + kBeside.size() && name.starts_with(file + kBeside.front());
     });
-    if (lock || other) leftovers.push_back(entry.path());
+    if (beside) leftovers.push_back(entry.path());
   }
   for (const fs::path& leftover : leftovers) fs::remove(leftover);
 }
