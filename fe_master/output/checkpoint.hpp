@@ -34,6 +34,8 @@ struct CheckpointSize {
 CheckpointSize write_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint,
                                 MaterialPoints& points);
 
+/// Where a run of this folder keeps its checkpoint.
+inline std::filesystem::path checkpoint_of(const std::filesystem::path& folder) { return folder / "checkpoint.h5"; }
 /// checkpoint.h5 -> checkpoint.previous.h5
 std::filesystem::path previous_checkpoint(const std::filesystem::path& file);
 

@@ -89,12 +89,9 @@ Path::Path(const Case& c, MaterialPoints& point, const RunOptions& options, int 
       driver_(point, parameters_),
       files_(c, options),
       end_request_(options.ends_before) {
-  if (options.existing == Existing::resume) {
-    const std::filesystem::path place = options.folder / "checkpoint.h5";
-    const CheckpointFile file(place);
-    resumed_ = file.read(options.versions);
-    refuse_other_case(place, *resumed_, c);
-    point.load_each(file.states());
+  if (Resumed resumed = resumed_from(options, c); resumed.file) {
+    resumed_ = std::move(resumed.checkpoint);
+    point.load_each(resumed.file->states());
   }
   files_.begin_history(columns(noise_samples > 0), resumed_ ? resumed_->step : 0);
 }
@@ -134,9 +131,7 @@ int Path::go() {
 }
 
 void Path::resume() {
-  files_.summary.steps = resumed_->step;
-  files_.summary.evaluations = static_cast<long>(find_array(resumed_->arrays, "run.counts").at(0));
-  files_.summary.dem_steps = find_array(resumed_->arrays, "run.counts").at(1);
+  files_.load(resumed_->step, resumed_->arrays);
   files_.log.start_from(resumed_->time / static_cast<double>(case_.path.size()));
   files_.log.say(fmt::format("restart after step {}", resumed_->step));
 }
@@ -153,9 +148,8 @@ void Path::save(std::size_t segment, double done, double size) {
                         options_.versions};
   driver_.save(checkpoint.arrays);
   checkpoint.arrays.emplace_back("path.done", std::vector<double>{done});
-  checkpoint.arrays.emplace_back(
-      "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
-  write_checkpoint(options_.folder / "checkpoint.h5", checkpoint, point_);
+  files_.save(checkpoint.arrays);
+  write_checkpoint(checkpoint_of(options_.folder), checkpoint, point_);
 }
 
 /// Increments of one segment, cut where they fail, until the smallest one fails too or it is told to end.

@@ -64,6 +64,15 @@ int load_until_the_end(const Case& c) {
 
 }  // namespace
 
+Resumed resumed_from(const RunOptions& options, const Case& c) {
+  if (options.existing != Existing::resume) return {};
+  const std::filesystem::path place = checkpoint_of(options.folder);
+  Resumed resumed{std::make_unique<CheckpointFile>(place), {}};
+  resumed.checkpoint = resumed.file->read(options.versions);
+  refuse_other_case(place, resumed.checkpoint, c);
+  return resumed;
+}
+
 void refuse_other_case(const std::filesystem::path& file, const Checkpoint& checkpoint, const Case& c) {
   const Parameters then = parameters(checkpoint.case_text), now = parameters(comparable_toml(c));
   const std::set<std::string> keys = differing(then, now);

@@ -28,6 +28,17 @@ void RunFiles::add(const StepRecord& record) {
   summary.engine_seconds += record.dem_seconds;
 }
 
+void RunFiles::save(NamedArrays& arrays) const {
+  arrays.emplace_back("run.counts", std::vector<double>{static_cast<double>(summary.evaluations), summary.dem_steps});
+}
+
+void RunFiles::load(int step, const NamedArrays& arrays) {
+  const std::vector<double>& counts = find_array(arrays, "run.counts");
+  summary.steps = step;
+  summary.evaluations = static_cast<long>(counts.at(0));
+  summary.dem_steps = counts.at(1);
+}
+
 void RunFiles::whole(double time) {
   whole_step_ = summary.steps;
   whole_time_ = time;

@@ -14,6 +14,7 @@
 #include "errors.hpp"
 #include "history.hpp"
 #include "log.hpp"
+#include "named_arrays.hpp"
 #include "output_folder.hpp"
 #include "summary.hpp"
 
@@ -46,6 +47,10 @@ class RunFiles {
   void begin_history(const std::vector<std::string>& columns, int last_step = 0);
   /// A converged step, or the state before the first: its row and its share of the sums.
   void add(const StepRecord& record);
+  /// The sums so far, for a checkpoint.
+  void save(NamedArrays& arrays) const;
+  /// Goes on after this step with the sums of its checkpoint.
+  void load(int step, const NamedArrays& arrays);
   /// Writes the summary and says the message. Returns the status.
   int finish(int status, const std::string& message);
   /// Wall time since the start [s].

@@ -20,8 +20,7 @@ namespace {
 /// The time loop of one run and the files that it fills.
 class TimeLoop {
  public:
-  TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed,
-           std::unique_ptr<CheckpointFile> file);
+  TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Resumed resumed);
   int go();
 
  private:
@@ -47,8 +46,7 @@ class TimeLoop {
   const Case& case_;
   const RunOptions& options_;
   MaterialPoints& points_;
-  Checkpoint resumed_;
-  std::unique_ptr<CheckpointFile> resumed_file_;
+  Resumed resumed_;
   RunFiles files_;
   NonlinearSolver& solver_;
   StepControl control_;
@@ -68,24 +66,23 @@ class TimeLoop {
   double checkpoint_seconds_ = 0, longest_evaluation_ = 0;  // wall time
 };
 
-TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Checkpoint resumed,
-                   std::unique_ptr<CheckpointFile> file)
+TimeLoop::TimeLoop(Problem& problem, MaterialPoints& points, const RunOptions& options, Resumed resumed)
     : problem_(problem),
       case_(problem.parameters()),
       options_(options),
       points_(points),
       resumed_(std::move(resumed)),
-      resumed_file_(std::move(file)),
       files_(case_, options),
       solver_(problem.start(points)),
       control_(case_.control, problem.formulation()),
-      results_(options.folder, problem.mesh(), point_positions(problem.formulation()), options.existing, resumed_.step),
+      results_(options.folder, problem.mesh(), point_positions(problem.formulation()), options.existing,
+               resumed_.checkpoint.step),
       size_(
           {case_.control.step, case_.control.min_step, case_.control.max_step, case_.control.growth, case_.control.cut},
           case_.control.end_time),
       end_request_(options.ends_before) {
   solver_.stop_when([this] { return told_to_end(); });
-  files_.begin_history(columns(), resumed_.step);
+  files_.begin_history(columns(), resumed_.checkpoint.step);
   state_.versions = options_.versions;
   state_.case_text = comparable_toml(case_);
 }
@@ -251,15 +248,14 @@ void TimeLoop::keep_state() {
   state_.arrays.clear();
   solver_.save(state_.arrays);
   control_.save(state_.arrays);
-  state_.arrays.emplace_back(
-      "run.counts", std::vector<double>{static_cast<double>(files_.summary.evaluations), files_.summary.dem_steps});
+  files_.save(state_.arrays);
   if (reuses())
     state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
 }
 
 void TimeLoop::write_state() {
   const auto start = Moment::clock::now();
-  const CheckpointSize size = write_checkpoint(options_.folder / "checkpoint.h5", state_, points_);
+  const CheckpointSize size = write_checkpoint(checkpoint_of(options_.folder), state_, points_);
   files_.checkpoint_written();
   last_saved_ = Moment::clock::now();
   checkpoint_seconds_ = std::chrono::duration<double>(last_saved_ - start).count();
@@ -300,23 +296,21 @@ std::string TimeLoop::stopped() {
 }
 
 void TimeLoop::restart() {
-  points_.load_each(resumed_file_->states());
-  resumed_file_.reset();
-  solver_.load(resumed_.arrays);
-  control_.load(resumed_.arrays);
+  points_.load_each(resumed_.file->states());
+  const Checkpoint& then = resumed_.checkpoint;
+  solver_.load(then.arrays);
+  control_.load(then.arrays);
   before_ = solver_.committed();
-  size_.set_size(resumed_.dt);
-  files_.summary.steps = resumed_.step;
+  size_.set_size(then.dt);
+  files_.load(then.step, then.arrays);
   files_.checkpoint_written();
-  files_.whole(resumed_.time);
-  files_.summary.evaluations = static_cast<long>(find_array(resumed_.arrays, "run.counts").at(0));
-  files_.summary.dem_steps = find_array(resumed_.arrays, "run.counts").at(1);
+  files_.whole(then.time);
   if (reuses()) {
-    const auto& reuse = find_array(resumed_.arrays, "run.reuse");
+    const auto& reuse = find_array(then.arrays, "run.reuse");
     reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
   }
-  files_.log.start_from(resumed_.time / case_.control.end_time);
-  files_.log.say(fmt::format("restart after step {} (time {:g})", resumed_.step, resumed_.time));
+  files_.log.start_from(then.time / case_.control.end_time);
+  files_.log.say(fmt::format("restart after step {} (time {:g})", then.step, then.time));
   resumed_ = {};
   keep_state();
 }
@@ -326,17 +320,10 @@ void TimeLoop::restart() {
 int run_case(Problem& problem, MaterialPoints& points, const RunOptions& options) {
   RunOptions locked = options;
   if (!locked.lock) locked.lock = prepare_output_folder(options.folder, options.existing);
-  Checkpoint resumed;
-  std::unique_ptr<CheckpointFile> file;
-  if (options.existing == Existing::resume) {
-    const std::filesystem::path place = options.folder / "checkpoint.h5";
-    file = std::make_unique<CheckpointFile>(place);
-    resumed = file->read(options.versions);
-    refuse_other_case(place, resumed, problem.parameters());
-  }
+  Resumed resumed = resumed_from(options, problem.parameters());
   std::optional<TimeLoop> loop;
   try {
-    loop.emplace(problem, points, locked, std::move(resumed), std::move(file));
+    loop.emplace(problem, points, locked, std::move(resumed));
   } catch (const DiskError& error) {
     throw DiskError(fmt::format("{}; no step has been made; make room and start again", error.what()));
   }
