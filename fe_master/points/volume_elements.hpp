@@ -94,14 +94,10 @@ class VolumeElements : public MaterialPoints {
   LocalPoints& local_;
   std::vector<std::vector<std::size_t>> shares_;  ///< points of each rank, in its order
   std::vector<double> latest_, older_;            ///< costs of each point since the last balance(), and before
-  double steps_ = 0;                              ///< DEM steps since then
   std::vector<PointReport> reports_;              ///< of the last commit
   EqualHistories histories_;
   std::size_t distinct_ = 0;
   FarmStatistics statistics_, at_last_balance_;
 };
-
-/// Serves the local points of a rank other than 0 until rank 0 destroys its VolumeElements.
-void serve(MPI_Comm communicator, LocalPoints& local);
 
 }  // namespace femxdem

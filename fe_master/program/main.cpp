@@ -16,6 +16,7 @@
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "output_folder.hpp"
+#include "rank_service.hpp"
 #include "time_loop.hpp"
 #include "tools.hpp"
 #include "ve_commands.hpp"

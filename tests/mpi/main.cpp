@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "errors.hpp"
+#include "rank_service.hpp"
 #include "served_points.hpp"
 
 namespace femxdem {

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "python_volume_elements.hpp"
+#include "rank_service.hpp"
 #include "ve_templates.hpp"
 #include "volume_elements.hpp"
 
