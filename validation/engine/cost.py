@@ -166,14 +166,20 @@ def measured(spheres, law, inertial_number, state=None):
     }
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--spheres", type=int, default=1000)
+def options(text, spheres):
+    """What is asked of one packing."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--spheres", type=int, default=spheres)
     parser.add_argument("--law", choices=LAWS, default="adhesive")
     parser.add_argument("--inertial-number", type=float, default=2e-2)
     parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
-    parser.add_argument("--state", type=Path, help="a prepared state of `femxdem ve prepare` instead of a new packing")
     parser.add_argument("--json", type=Path, help="where the numbers go")
+    return parser
+
+
+def main():
+    parser = options(__doc__, 1000)
+    parser.add_argument("--state", type=Path, help="a prepared state of `femxdem ve prepare` instead of a new packing")
     arguments = parser.parse_args()
     paths(arguments.modules)
     state = arguments.state.read_bytes() if arguments.state else None

@@ -7,13 +7,11 @@
 in the order of its container. "disturbed": YADE whose spheres have been moved by 1e-15 of the cell's width at the start.
 """
 
-import argparse
 import json
-from pathlib import Path
 
 import numpy as np
 
-from cost import BIAXIAL, LAWS, ROOT, paths
+from cost import BIAXIAL, LAWS, options, paths
 
 AT = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 
@@ -56,13 +54,7 @@ def move(O):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--spheres", type=int, default=400)
-    parser.add_argument("--law", choices=LAWS, default="adhesive")
-    parser.add_argument("--inertial-number", type=float, default=2e-2)
-    parser.add_argument("--modules", type=Path, default=ROOT / "build/release", help="folder of the compiled modules")
-    parser.add_argument("--json", type=Path, help="where the numbers go")
-    arguments = parser.parse_args()
+    arguments = options(__doc__, 400).parse_args()
     paths(arguments.modules)
     found = measured(arguments.spheres, arguments.law, arguments.inertial_number)
     print("steps           " + "".join(f"{n:9d}" for n in AT))
