@@ -132,7 +132,16 @@ def near(folder, reference):
 
 def inject(place, fault):
     """What came of it: {status, said, readable, steps, restart, differs, way}."""
-    reference, folder = place.reference(fault), place.work / "struck"
+    folder = place.work / "struck"
+    try:
+        return _inject(place, fault, folder)
+    finally:
+        if os.path.ismount(folder):  # a small disk
+            subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def _inject(place, fault, folder):
+    reference = place.reference(fault)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     undo = fault.prepare(folder) if fault.prepare else None
