@@ -27,7 +27,7 @@ from same_results import differences
 SKIPPED = 77
 SIGNAL_BEFORE_END = 30  # seconds; Slurm limits times to whole minutes
 PROCESSOR_SECONDS = 200  # of the run, about: its first 30 s do not end it, on two free processors either
-MOST = 600  # seconds in Slurm
+MOST = 900  # seconds in Slurm
 MEASURED_AT = 5e-4  # the inertial number of the run that is timed; DEM steps, and with them the seconds, go with its inverse
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "squeue", "mpirun")
 CONFIGURATION = """\
