@@ -167,9 +167,10 @@ def table(jobs):
         of_kind = [s for s in stops if s.how == how]
         steps = ", ".join(str(n) for n in sorted({s.step for s in of_kind}))
         lines.append(f"| {how} | " + " | ".join(str(sum(s.ranks == n for s in of_kind)) for n in counts) + f" | {steps} |")
-    equal = sum(not different for _, different in jobs)
-    lines += ["", f"{len(stops)} stops in {len(jobs)} jobs, each of which went on on another number of ranks after every stop: "
-              f"{equal} of {len(jobs)} end with the bits of the run that nobody stopped."]
+    struck = [different for of_job, different in jobs if of_job]  # others were over before their stop
+    equal = sum(not different for different in struck)
+    lines += ["", f"{len(stops)} stops in {len(struck)} jobs, each of which went on on another number of ranks after every stop: "
+              f"{equal} of {len(struck)} end with the bits of the run that nobody stopped."]
     return lines
 
 
