@@ -2,6 +2,7 @@
 
 import math
 import os
+import shutil
 import time
 import zlib
 from dataclasses import dataclass
@@ -71,6 +72,8 @@ class Engine:
         from yade.utils import Matrix3
 
         self._utils, self._Matrix3 = yade._utils, Matrix3
+        self._temporary = os.path.dirname(self.O.tmpFilename())  # YADE's in /tmp, which who is killed would leave there
+        shutil.rmtree(self._temporary, ignore_errors=True)
         self.report_fields = list(report_fields)
         self._free, self._trial, self._grains = [], {}, {}  # scene 0 is where templates are made
 
@@ -161,7 +164,11 @@ class Engine:
             return [], {}
         if spec["source"] == "script":
             limits = [spec["script_" + what] for what in ("steps", "seconds", "memory", "output")]
-            return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
+            os.makedirs(self._temporary, mode=0o700, exist_ok=True)
+            try:
+                return user_scenes.run_script(self.O, spec["script"], spec["arguments"], *limits)
+            finally:
+                shutil.rmtree(self._temporary, ignore_errors=True)
         raise ValueError(f"ve.source = \"{spec['source']}\" is unknown: use \"prepare\", \"scene\" or \"script\".")
 
     def add(self, state):

@@ -138,7 +138,7 @@ def run(femxdem, case, out, settings):
     before = spent()
     done = subprocess.run([femxdem, "run", case, "--out", out, *options(settings)], capture_output=True, text=True, cwd=out.parent)
     if done.returncode != 0:
-        raise SystemExit(f"the run without Slurm: {done.stdout}{done.stderr}")
+        raise SystemExit(f"the run without Slurm: {(done.stdout + done.stderr)[-2000:]}")
     return spent() - before
 
 
@@ -156,7 +156,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     folder.chmod(0o755)
     case, results, started = CLUSTER / "stops.toml", folder / "results", time.time()
-    settings = ["control.end_time=4", "control.step=0.02", "control.max_step=0.02", "output.checkpoint_every=1"]
+    settings = ["control.step=0.01", "control.max_step=0.01", "output.checkpoint_every=1"]
     packings = f've.cache="{results / "packings"}"'
     used = run(femxdem, case, folder / "timed", [*settings, packings, "ve.seed=1", f"ve.inertial_number={MEASURED_AT}"])
     settings.append(f"ve.inertial_number={MEASURED_AT * used / PROCESSOR_SECONDS:.1e}")

@@ -77,6 +77,12 @@ class Limits(Scripts):
         with mock.patch("user_scenes.cut_off_network", lambda: False):
             self.assertIn("the script could reach the network", self.make()["manifest"]["notes"][0])
 
+    def test_the_temporary_folder_of_yade_is_there_for_scripts_alone(self):
+        folder = Path(engine().O.tmpFilename()).parent
+        self.assertFalse(folder.exists())
+        self.make(bodies="open(O.tmpFilename(), 'w').write('theirs')")
+        self.assertFalse(folder.exists())
+
     def test_standard_input_is_empty(self):
         self.refused("failed: EOFError|failed: OSError", bodies="input('how many? ')")
 
