@@ -26,9 +26,9 @@ from same_results import differences
 
 SKIPPED = 77
 SIGNAL_BEFORE_END = 30  # seconds; Slurm limits times to whole minutes
-PROCESSOR_SECONDS = 200  # of the run, about: its first 30 s do not end it, on two free processors either
+PROCESSOR_SECONDS = 130  # of the run, about: its first 30 s do not end it, on two free processors either
 MOST = 900  # seconds in Slurm
-MEASURED_AT = 5e-4  # the inertial number of the run that is timed; DEM steps, and with them the seconds, go with its inverse
+MEASURED_AT = 2e-5  # the inertial number of the run that is timed; DEM steps, and with them the seconds, go with its inverse
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "squeue", "mpirun")
 CONFIGURATION = """\
 ClusterName=test
