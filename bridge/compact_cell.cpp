@@ -142,11 +142,12 @@ VeInfo CompactCell::info() const {
   return {h.time_step, time_scale(h, pressure), pressure};
 }
 
-std::array<double, 81> CompactCell::stiffness(bool relaxed) const {
-  const std::vector<Spring> network = springs(block_->arrays());
+std::array<double, 81> CompactCell::stiffness(VeStiffness kind) const {
+  const std::vector<Spring> network = springs(block_->arrays(), kind);
   const CompactHeader& h = block_->header();
   const double volume = determinant(h.H);
-  return relaxed ? relaxed_stiffness(h.spheres, network, volume) : affine_stiffness(network, volume);
+  return kind == VeStiffness::relaxed ? relaxed_stiffness(h.spheres, network, volume)
+                                      : affine_stiffness(network, volume);
 }
 
 void CompactCell::follow_network() {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "material_points.hpp"
+#include "ve_parameters.hpp"
 #include "worker_protocol.hpp"
 
 namespace femxdem {
@@ -93,9 +94,8 @@ class CompactCell {
   PointReport report() const;
   /// The rest of a report that trial_report has begun, of the same state; its costs are those of the last deform.
   void complete(PointReport& report) const;
-  /// Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised, (3, 3, 3, 3) [Pa]; relaxed: the same
-  /// network with its grains in equilibrium.
-  std::array<double, 81> stiffness(bool relaxed) const;
+  /// Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised, (3, 3, 3, 3) [Pa], or another of its kind.
+  std::array<double, 81> stiffness(VeStiffness kind) const;
   VeInfo info() const;
   double time_step() const;  ///< [s]
   /// The time step becomes what the contact network of now asks for, between load steps: within 1e-12 of what

@@ -1,6 +1,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+
 #include "compact_block.hpp"
 #include "compact_cell.hpp"
 #include "errors.hpp"
@@ -79,8 +81,12 @@ PYBIND11_MODULE(compact_cell, module) {
              return array(c.stretch(), {3, 3});
            })
       .def("stiffness",
-           [](const CompactCell& c, bool relaxed) {
-             return array(c.stiffness(relaxed), {3, 3, 3, 3});
+           [](const CompactCell& c, const std::string& kind) {
+             const auto found = std::find(femxdem::kStiffnessWords.begin(), femxdem::kStiffnessWords.end(), kind);
+             if (found == femxdem::kStiffnessWords.end())
+               throw std::invalid_argument("no stiffness of the name " + kind);
+             return array(c.stiffness(static_cast<femxdem::VeStiffness>(found - femxdem::kStiffnessWords.begin())),
+                          {3, 3, 3, 3});
            })
       .def("rest", &CompactCell::rest)
       .def("hold",

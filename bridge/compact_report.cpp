@@ -173,12 +173,16 @@ void complete_report(const CompactArrays& a, const CompactTrial& trial, PointRep
   r["mean_rotation"] = mean_rotation(a);
 }
 
-std::vector<Spring> springs(const CompactArrays& a) {
+std::vector<Spring> springs(const CompactArrays& a, VeStiffness kind) {
+  const bool reduced = kind == VeStiffness::reduced;
   std::vector<Spring> all;
   all.reserve(a.header->contacts);
-  for (std::size_t c = 0; c < a.header->contacts; ++c)
-    all.push_back(
-        {a.i[c], a.j[c], {a.normal[0][c], a.normal[1][c], a.normal[2][c]}, norm(branch(a, c)), a.kn[c], a.ks[c]});
+  for (std::size_t c = 0; c < a.header->contacts; ++c) {
+    const Eigen::Vector3d normal(a.normal[0][c], a.normal[1][c], a.normal[2][c]);
+    const double kt = kind == VeStiffness::sliding && slides(a, c) ? 0 : a.ks[c];
+    all.push_back({a.i[c], a.j[c], normal, norm(branch(a, c)), (reduced ? kReducedNormal : 1) * a.kn[c],
+                   (reduced ? kReducedTangent : 1) * kt});
+  }
   return all;
 }
 

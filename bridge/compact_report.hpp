@@ -22,6 +22,6 @@ PointReport trial_report(const CompactArrays& arrays, const CompactTrial& trial)
 /// The rest of it, and what the trial has cost.
 void complete_report(const CompactArrays& arrays, const CompactTrial& trial, PointReport& report);
 /// The contacts as springs.
-std::vector<Spring> springs(const CompactArrays& arrays);
+std::vector<Spring> springs(const CompactArrays& arrays, VeStiffness kind = VeStiffness::affine);
 
 }  // namespace femxdem

@@ -225,7 +225,7 @@ void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
   if (trial.failure) return;
   trial.found.stiffness.reset();
   if (wanted == Operator::elastic)
-    trial.found.stiffness = Eigen::Map<const Tensor4>(trial.cell->stiffness(options_.relaxed).data());
+    trial.found.stiffness = Eigen::Map<const Tensor4>(trial.cell->stiffness(options_.stiffness).data());
 }
 
 void CompactVolumeElements::deform(Trial& trial) const {

@@ -9,6 +9,9 @@
 /// The springs of a periodic packing's contacts: stiffness and time step.
 namespace femxdem {
 
+/// Of the authors' code, on the stiffnesses of Eq. (2): VeStiffness::reduced.
+inline constexpr double kReducedNormal = 0.93, kReducedTangent = 0.63;
+
 struct Spring {
   std::int64_t i = 0, j = 0;  ///< grains
   Eigen::Vector3d normal;     ///< unit, from i to j

@@ -100,7 +100,9 @@ void Engine::complete_report(int ve, Slot& slot) { call("complete_report", ve, v
 void Engine::measure(int ve, Slot& slot) {
   call("measure", ve, view(slot.stress), view(slot.report), view(slot.stretch));
 }
-void Engine::stiffness(int ve, Slot& slot, bool relaxed) { call("stiffness", ve, view(slot.stiffness), relaxed); }
+void Engine::stiffness(int ve, Slot& slot, VeStiffness kind) {
+  call("stiffness", ve, view(slot.stiffness), kStiffnessWords.at(static_cast<std::size_t>(kind)));
+}
 
 Engine::Export Engine::export_scene(const std::string& state) {
   return in_python([&] {

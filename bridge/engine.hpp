@@ -43,7 +43,7 @@ class Engine {
   void measure(int ve, Slot& slot);
   /// The rest of the report that measure has begun.
   void complete_report(int ve, Slot& slot);
-  void stiffness(int ve, Slot& slot, bool relaxed);
+  void stiffness(int ve, Slot& slot, VeStiffness kind);
   void follow_network(int ve);
 
   /// fork() with the interpreter's consent.

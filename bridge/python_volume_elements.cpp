@@ -120,7 +120,7 @@ void PythonVolumeElements::run_trial(bool with_stiffness, std::vector<Response>&
   std::vector<int> deaths(size(), 0);
   with_stiffness_ = with_stiffness;
   for (;;) {
-    const std::int64_t stiffness = !with_stiffness ? kNoStiffness : options_.relaxed ? kRelaxed : kAffine;
+    const std::int64_t stiffness = with_stiffness ? static_cast<std::int64_t>(options_.stiffness) : kNoStiffness;
     const Reply reply = worker_.request(Command::evaluate, stiffness, !options_.serialise);
     if (reply.kind == ReplyKind::done) {
       if (reply.value == 0 && !said_serialised_) {

@@ -10,6 +10,7 @@
 
 #include "equal_histories.hpp"
 #include "material_points.hpp"
+#include "ve_parameters.hpp"
 
 namespace femxdem {
 
@@ -23,7 +24,7 @@ struct VolumeElementOptions {
   /// Where in the trial its stress belongs: 1, at its end; 1/2 to 2/3: it is the mean over the trial, which belongs
   /// there (later ones weigh more beyond 1/2: 1 + late (2 t / T - 1)) [-].
   double answer_at = 1;
-  bool relaxed = false;        ///< the elastic stiffness is the relaxed one, not Eq. (2)
+  VeStiffness stiffness = VeStiffness::affine;
   bool quantised = false;      ///< stretches are followed up to kQuantum (compact cells; YADE to compare bits)
   bool serialise = false;      ///< YADE's volume elements are saved and restored at every trial, not forked
   bool start_at_rest = false;  ///< a trial forgets the velocities of its start (compact cells)

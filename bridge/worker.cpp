@@ -294,7 +294,7 @@ void Worker::deform_one(std::size_t index, std::int64_t stiffness) {
     if (slot.steps > 0) engine_.deform(ve, slot);
     engine_.measure(ve, slot);
     if (slot.steps == 0) slot.mean_stress = slot.stress;
-    if (stiffness != kNoStiffness) engine_.stiffness(ve, slot, stiffness == kRelaxed);
+    if (stiffness != kNoStiffness) engine_.stiffness(ve, slot, static_cast<VeStiffness>(stiffness));
     slot.outcome = Outcome::answered;
   } catch (const std::exception& error) {
     write_sentence(slot, error.what());

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "material_points.hpp"
+#include "ve_parameters.hpp"
 
 /// What a rank and its worker share: commands and replies on a SOCK_SEQPACKET socket, the numbers of the volume
 /// elements (VEs) in shared memory, and a mailbox (an anonymous file) for what is long: states, specifications, texts.
@@ -24,7 +25,7 @@ enum class Command : std::uint32_t {
   make_template,  ///< mail in: JSON; mail out: state (Reply::value bytes), then the manifest as JSON
   add,            ///< mail in: state; a: number of copies, at the end of the batch
   remove,         ///< a: index; those behind move up by one
-  evaluate,       ///< a: kAffine, ...; b: 1 fork, 0 serialise; reply value: 1 if the trial was forked
+  evaluate,       ///< a: kNoStiffness or VeStiffness; b: 1 fork, 0 serialise; reply value: 1 if the trial was forked
   commit,         ///< the trial becomes the committed state; reply value: process id of the committed process
   reject,         ///< the trial is given up; no reply
   save,           ///< a: index; mail out: state, from which the volume element goes on
@@ -37,10 +38,8 @@ enum class Command : std::uint32_t {
   quit            ///< no reply
 };
 
-/// Which stiffness an evaluation is to find.
-inline constexpr std::int64_t kNoStiffness = 0;
-inline constexpr std::int64_t kAffine = 1;
-inline constexpr std::int64_t kRelaxed = 2;
+/// An evaluation is to find no stiffness; else the number of a VeStiffness.
+inline constexpr std::int64_t kNoStiffness = -1;
 
 struct Message {
   Command command = Command::quit;

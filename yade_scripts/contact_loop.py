@@ -122,6 +122,19 @@ def relaxed_stiffness(c, kn, kt, volume):
     return stiffness(c, kn, kt, volume) - released[PLACE[:, :, None, None], PLACE]
 
 
+def stiffness_of_kind(O, c, radius, volume, kind):
+    """affine, Eq. (2); relaxed; reduced, Eq. (2) with 0.93 kn and 0.63 kt, as the authors' code has it; sliding, Eq. (2)
+    without the kt of contacts that slide. radius (n,) of the bodies [m]."""
+    kn, kt = stiffnesses(O, c)
+    if kind == "relaxed":
+        return relaxed_stiffness(c, kn, kt, volume)
+    if kind == "reduced":
+        kn, kt = 0.93 * kn, 0.63 * kt
+    if kind == "sliding":
+        kt = np.where(at_coulomb_limit(c, radius), 0.0, kt)
+    return stiffness(c, kn, kt, volume)
+
+
 def at_coulomb_limit(c, radius):
     """(m,) whether a contact slides: its shear force is at the limit of its law, within 1e-6 of it.
 

@@ -93,7 +93,7 @@ def write_stiffness(packing, file):
         out = np.empty(81)
         start = time.perf_counter()
         try:
-            packing.engine.stiffness(packing.ve, out, name == "relaxed")
+            packing.engine.stiffness(packing.ve, out, name)
         except RuntimeError as reason:  # clumps, or contacts without stiffnesses
             print(f"{name} stiffness: {reason}")
             continue

@@ -32,6 +32,6 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
                                        old as 200 DEM steps, the rest is of now
     follow_network(ve)                 the time step of info() becomes what the state of now asks for; called between
                                        load steps, never within one
-    stiffness(ve, out_stiffness, relaxed)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised
-                                       [Pa]; relaxed: the same contact network with its grains in equilibrium
+    stiffness(ve, out_stiffness, kind)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised
+                                       [Pa] ("affine"), or another of its kind: contact_loop.stiffness_of_kind
 """

@@ -300,21 +300,19 @@ class Engine:
             if name in values:
                 out_report[k] = values[name]
 
-    def stiffness(self, ve, out_stiffness, relaxed=False):
+    def stiffness(self, ve, out_stiffness, kind="affine"):
         self._select(ve)
         if self._sums_in_order():
-            out_stiffness[:] = np.array(compact_scene.cell(self.O).stiffness(relaxed)).ravel()
+            out_stiffness[:] = np.array(compact_scene.cell(self.O).stiffness(kind)).ravel()
             return
         c, volume = contact_loop.contacts(self.O), self.O.cell.volume
         if contact_loop.has_stiffness(self.O, c) and not self._grains[ve].clumped:
-            kn, kt = contact_loop.stiffnesses(self.O, c)
-            formula = contact_loop.relaxed_stiffness if relaxed else contact_loop.stiffness
-            C = formula(c, kn, kt, volume)
-        elif not relaxed:
+            C = contact_loop.stiffness_of_kind(self.O, c, self._grains[ve].radius, volume, kind)
+        elif kind == "affine":
             C = probing.stiffness(self.O, self._love_weber)
         else:
             raise RuntimeError(
-                "The relaxed stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
+                f"The {kind} stiffness needs spheres whose contacts know their kn and ks: use ve.stiffness = \"affine\"."
             )
         out_stiffness[:] = C.ravel()
 

@@ -192,8 +192,10 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
                 "the DEM steps of a load step's trials are those of its first; false: for comparison only"),
       parameter("max_unbalanced_force", &V::max_unbalanced_force, "", kPositive,
                 "an answer above is refused as unstable"),
-      word("stiffness", &V::stiffness, {"affine", "relaxed"},
-           "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium"),
+      word("stiffness", &V::stiffness, {kStiffnessWords.begin(), kStiffnessWords.end()},
+           "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium; reduced, "
+           "Eq. (2) with "
+           "0.93 kn and 0.63 kt; sliding, Eq. (2) without the kt of contacts that slide"),
       word("engine", &V::engine, {"auto", "yade", "compact"},
            "what strains it: YADE, or compact cells, which make YADE's step to the bit; auto: compact where they can"),
       parameter("check_every", &V::check_every, "", kNotNegative,

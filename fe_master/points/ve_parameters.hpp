@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,11 @@ enum class VeSource { prepare, scene, script };
 enum class ContactLaw { adhesive, bonded, friction, paper };
 enum class NewContacts { frictional, adhesive };
 enum class Snapshot { fork, serialise };
-enum class VeStiffness { affine, relaxed };
+/// Elastic stiffness of the contacts' springs: Eq. (2) of Nguyen et al. (2017); with the grains in equilibrium; Eq. (2)
+/// as the authors' code has it, with 0.93 kn and 0.63 kt; Eq. (2) without the kt of contacts that slide.
+enum class VeStiffness { affine, relaxed, reduced, sliding };
+inline constexpr std::array kStiffnessWords = {"affine", "relaxed", "reduced",
+                                               "sliding"};  ///< in the order of VeStiffness
 enum class EngineChoice { automatic, yade, compact };
 enum class VeAnswer { end, mean };
 enum class Assignment { same, random };

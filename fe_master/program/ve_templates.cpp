@@ -165,7 +165,7 @@ VolumeElementOptions ve_options(const VeParameters& ve) {
   options.hold_steps = ve.hold_steps;
   options.freeze_steps = ve.freeze_steps;
   options.max_unbalanced_force = ve.max_unbalanced_force;
-  options.relaxed = ve.stiffness == VeStiffness::relaxed;
+  options.stiffness = ve.stiffness;
   options.quantised = ve.sorted_contacts;
   options.serialise = ve.snapshot == Snapshot::serialise;
   return options;

@@ -99,7 +99,7 @@ class DummyEngine:
             time.sleep(3600)
         raise RuntimeError(f"dummy cell {ve} failed on purpose (fault = {kind}); choose a smaller step.")
 
-    def stiffness(self, ve, out_stiffness, relaxed=False):
+    def stiffness(self, ve, out_stiffness, kind="affine"):
         cell = self.cells[ve]
         E, nu = cell["youngs_modulus"], cell["poisson_ratio"]
         lam, mu, d = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu)), np.eye(3)

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "analytic_points.hpp"
+#include "eigenvalues.hpp"
 #include "elastic_problem.hpp"
 #include "errors.hpp"
 #include "learned_tangent.hpp"
@@ -42,7 +43,7 @@ Eigen::MatrixXd free_matrix(const Formulation& element) {
 }
 
 int zero_modes(const Eigen::MatrixXd& K) {
-  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(K).eigenvalues();
+  const Eigen::VectorXd values = eigenvalues(K);
   return static_cast<int>((values.array() < 1e-10 * values.maxCoeff()).count());
 }
 

@@ -18,7 +18,7 @@
 namespace femxdem {
 namespace {
 
-std::string data(const std::string& name) { return std::string(TEST_CASES) + "/mesh/" + name; }
+std::string data(const std::string& name) { return fmt::format("{}/mesh/{}", TEST_CASES, name); }
 
 double area(const Mesh& mesh) {
   double sum = 0.0;

@@ -67,10 +67,10 @@ def measure(ve):
     return stress.reshape(3, 3), dict(zip(FIELDS, report)), stretch.reshape(3, 3)
 
 
-def stiffness(ve, relaxed=False):
+def stiffness(ve, kind="affine"):
     """Elastic stiffness (3, 3, 3, 3)."""
     out = np.full(81, np.nan)
-    engine().stiffness(ve, out, relaxed)
+    engine().stiffness(ve, out, kind)
     return out.reshape(3, 3, 3, 3)
 
 

@@ -209,14 +209,15 @@ class Reports(unittest.TestCase):
             for key, value in engine().info(ve).items():
                 np.testing.assert_allclose(c.info()[key], value, rtol=1e-12, err_msg=key)
 
-    def test_stiffness_affine_and_relaxed(self):
+    def test_stiffnesses_of_every_kind(self):
         for name in ("friction", "adhesive", "soft, wide sizes"):
             ve, c = sorted_element(SPECS[name]), cell(name)
             L = next(rates(c))
             engine().deform(ve, L, 40)
             c.deform(L, 40)
-            for relaxed in (False, True):
-                mine, theirs = mandel(c.stiffness(relaxed)), mandel(stiffness(ve, relaxed))
+            kinds = {kind: (mandel(c.stiffness(kind)), mandel(stiffness(ve, kind))) for kind in ("affine", "relaxed", "reduced", "sliding")}
+            self.assertLess(np.trace(kinds["sliding"][0]), np.trace(kinds["affine"][0]))
+            for mine, theirs in kinds.values():
                 np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-10 * np.abs(theirs).max())
 
     def test_mean_stress_over_the_steps(self):

@@ -63,7 +63,7 @@ class Packing(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.ve = element(FRICTION)
-        cls.affine, cls.relaxed = stiffness(cls.ve), stiffness(cls.ve, relaxed=True)
+        cls.affine, cls.relaxed = stiffness(cls.ve), stiffness(cls.ve, kind="relaxed")
 
     def test_is_symmetric_positive_and_below_equation_2(self):
         A6, R6 = mandel(self.affine), mandel(self.relaxed)

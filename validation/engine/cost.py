@@ -151,8 +151,8 @@ def measured(spheres, law, inertial_number, state=None):
         "stress": committed.stress,
         "report": committed.report,
         "save": committed.save,
-        "Eq. (2)": lambda: committed.stiffness(False),
-        "relaxed stiffness": lambda: committed.stiffness(True),
+        "Eq. (2)": lambda: committed.stiffness("affine"),
+        "relaxed stiffness": lambda: committed.stiffness("relaxed"),
     }
     both = lambda values: (float(min(values)), float(np.median(values)))
     return {

@@ -46,7 +46,7 @@ def main():
     C = np.zeros(81)
     noted = milliseconds(lambda: engine.stiffness(ve, C), a.repetitions)
     step = milliseconds(lambda: [engine.O.step() for _ in range(10)], a.repetitions)
-    relaxed = milliseconds(lambda: engine.stiffness(ve, C, relaxed=True), 3)
+    relaxed = milliseconds(lambda: engine.stiffness(ve, C, "relaxed"), 3)
     note_constant_stiffness(engine.O, 0.0, 0.0)  # not true: every contact is asked, as in a user's script
     read = milliseconds(lambda: engine.stiffness(ve, C), a.repetitions)
     print(f"{a.spheres} spheres, {a.law}: least and median processor time [ms]")

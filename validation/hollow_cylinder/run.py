@@ -30,8 +30,8 @@ PAPER = {
     "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=0)  # memory: README.md,
 }
 UNIQUENESS = {
-    f"start_{mesh}_{n}": Row(f"{mesh}.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}"),
-                             f"{mesh}, random start {n} of the step past sigma_int = 2.8 sigma_0", checkpoint_every=0)
+    f"start_{mesh}_{n}": Row(f"{mesh}.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}", "control.end_time=1.4"),
+                             f"{mesh}, random start {n} of the step past sigma_int = 2.8 sigma_0, to where the bands are formed", checkpoint_every=0)
     for mesh in (870, 1280) for n in (1, 2, 3, 4, 5)
 }
 CELL = {

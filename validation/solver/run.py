@@ -32,10 +32,14 @@ STRATEGIES = {
     "newton_line_search": ["solver.operator=tangent", "solver.line_search=true"],
     "perturbation": ["solver.operator=perturbation"],
     "elastic": ["solver.operator=elastic"],
+    "elastic_reduced": ["solver.operator=elastic", "ve.stiffness=reduced"],
+    "elastic_sliding": ["solver.operator=elastic", "ve.stiffness=sliding"],
+    "elastic_relaxed": ["solver.operator=elastic", "ve.stiffness=relaxed"],
     "elastic_anderson": ["solver.operator=elastic", "solver.acceleration=anderson", "solver.anderson_depth=8"],
     "elastic_zero_start": ["solver.operator=elastic", "solver.predictor=none"],
 }
 CLOSED_FORM_ONLY = {"newton", "newton_line_search"}
+VE_ONLY = {"elastic_reduced", "elastic_sliding", "elastic_relaxed"}
 
 
 def measure(history, rejected, monitor, end):
@@ -103,7 +107,7 @@ class Grid:
         self.closed_form = 'type = "volume_element"' not in text
         self.end = a.end or (0.6 if self.closed_form else 2.0)
         self.seeds = [None] if self.closed_form else a.seeds
-        names = [name for name in a.strategies if self.closed_form or name not in CLOSED_FORM_ONLY]
+        names = [name for name in a.strategies if name not in (VE_ONLY if self.closed_form else CLOSED_FORM_ONLY)]
         self.keys = [(name, tolerance, increment, seed) for increment, tolerance, name, seed in
                      itertools.product(a.increments, sorted(a.tolerances), names, self.seeds)]
 
