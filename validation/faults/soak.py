@@ -67,19 +67,22 @@ class LongRun:
                                         stdout=self.said, stderr=self.said)
         injections.wait_for(self.process, lambda: len(injections.history(self.folder)) >= 3, 600)
         self.samples = {"rank": [], "worker": []}
-        self.killed, self.zombies, self.started = 0, 0, time.monotonic()
+        self.killed, self.struck, self.zombies, self.started = 0, 0, 0, time.monotonic()
 
     def strike(self, rng):
-        trials = injections.trials(self.process)
-        if trials:
+        """Once a step: two kills of one trial are a failed point, and a busy machine takes long for a trial."""
+        trials, steps = injections.trials(self.process), len(injections.history(self.folder))
+        if trials and steps > self.struck:
             try:
                 injections.os.kill(trials[0], rng.choice((signal.SIGSEGV, signal.SIGKILL)))
-                self.killed += 1
+                self.killed, self.struck = self.killed + 1, steps
             except ProcessLookupError:
                 pass
 
     def sample(self):
         now = time.monotonic() - self.started
+        if self.process.poll() is not None:
+            raise SystemExit(f"{self.folder}: the long run has ended with status {self.process.returncode}, see {self.said.name}")
         workers = injections.workers(self.process)
         for name, pid in (("rank", self.process.pid), ("worker", workers[0] if workers else 0)):
             if size := proportional_size(pid):
