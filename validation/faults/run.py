@@ -130,8 +130,7 @@ def memory(place, rng, k):
     case = ("law", "compact", "yade", "yade")[k % 4]
     if k % 4 == 3:
         environment = {"LD_PRELOAD": str(place.runs / "interpose.so"), "FAULT_PROGRAM": "femxdem-worker", "FAULT_FORK": str(rng.randint(1, 12))}
-        looks = ("sliding_contacts", "adhesive_contacts")  # up to 200 DEM steps old; a restored VE is looked at anew
-        return Fault("fork refused", case, environment=environment, apart=looks)
+        return Fault("fork refused", case, environment=environment, restored=True)
     most = rng.randint(*{"law": (250, 700), "compact": (400, 2500), "yade": (400, 2500)}[case]) << 20
     return Fault(f"{most >> 20} MB", case, limits={resource.RLIMIT_AS: most})
 

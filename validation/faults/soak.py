@@ -117,7 +117,7 @@ def work(c, minutes):
     steps, left = len(injections.history(long.folder)), long.end()
     slopes = {name: slope(samples) for name, samples in long.samples.items()}
     new = sorted(temporary() - before)
-    strays = sorted(f.name for f in (place.work / "struck").iterdir() if f.suffix in (".undo", ".new") or "." in f.stem)
+    strays = injections.strays(place.work / "struck")
     lines = ["| minutes | trials killed | steps of the long run | runs struck | wrong | memory of rank, worker [MB/min] | zombies | processes left | new in /dev/shm and temporary folder | strays beside results |",
              "|---|---|---|---|---|---|---|---|---|---|",
              f"| {minutes:g} | {long.killed} | {steps} | {runs} | {wrong} | {slopes['rank']:.2f}, {slopes['worker']:.2f} | {long.zombies} | {len(left)} | {len(new)} | {len(strays)} |"]
