@@ -1,9 +1,11 @@
 #include "python_volume_elements.hpp"
 
 #include <fmt/format.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
+#include <csignal>
 #include <limits>
 #include <stdexcept>
 
@@ -18,6 +20,10 @@ PythonVolumeElements::PythonVolumeElements(WorkerProcess& worker, VolumeElementO
 PythonVolumeElements::Template PythonVolumeElements::make_template(const std::string& specification_json) {
   drop_trial();
   const Reply reply = worker_.request(Command::make_template, 0, 0, specification_json);
+  if (reply.kind == ReplyKind::child_died && WIFSIGNALED(reply.value) && WTERMSIG(reply.value) == SIGALRM)
+    throw UserError(
+        "volume element: its script is within a call that cannot be interrupted, 20 s after ve.script_seconds; let it "
+        "end, or give it more time");
   if (reply.kind == ReplyKind::child_died)
     throw UserError(
         fmt::format("volume element: its preparation ended with {} by itself, its output is above; see what its script "

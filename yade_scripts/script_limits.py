@@ -1,5 +1,6 @@
-"""What a user's script may take: memory, and room for what it says or writes."""
+"""What a user's script may take: memory, and room for what it says or writes; no network."""
 
+import ctypes
 import mmap
 import os
 import resource
@@ -71,6 +72,22 @@ class Limits:
                 self._count[:8] = struct.pack("q", done)
         finally:
             _exit(0)
+
+
+def cut_off_network():
+    """From now on this thread, and what it starts, sees no network, as in `unshare --net`; whether the system allows that. Who
+    is not root becomes itself in a user namespace of its own."""
+    new_user, new_net = 0x10000000, 0x40000000  # of sched.h
+    unshare = ctypes.CDLL(None, use_errno=True).unshare
+    if unshare(new_net) == 0:
+        return True
+    user, group = os.geteuid(), os.getegid()
+    if unshare(new_user | new_net) != 0:
+        return False
+    for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1")):
+        with open(f"/proc/self/{name}", "w") as file:
+            file.write(text)
+    return True
 
 
 def _address_space():

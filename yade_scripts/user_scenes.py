@@ -1,7 +1,9 @@
 """The doors for users' own volume elements: a saved scene, or a YADE script that runs unchanged."""
 
 import ctypes
+import hashlib
 import os
+import signal
 import sys
 import tempfile
 import threading
@@ -11,14 +13,24 @@ from pathlib import Path
 
 from script_exits import Left, catch_exits, left
 from script_inputs import recorded
-from script_limits import Limits
+from script_limits import Limits, cut_off_network
 from script_windows import close_windows, drop_nothings
 
+GRACE = 20  #: [s] for a script to end after its time; bridge/python_volume_elements.cpp has its sentence
 
-def load_scene(O, path):
-    """Loads a saved scene (.yade.gz, .xml, .xml.bz2, .yade.bz2). Raises ValueError with the reason."""
+
+def load_scene(O, path, sha256):
+    """Loads a saved scene (.yade.gz, .xml, .xml.bz2, .yade.bz2) whose file has that SHA-256, or any where it is "any": what reads
+    an archive trusts its author. Raises ValueError with the reason."""
     if not Path(path).is_file():
         raise ValueError(f've.scene = "{path}": no such file.')
+    own = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    if not sha256:
+        raise ValueError(
+            f've.scene = "{path}" is an archive, which may do what its author likes; if you trust it write ve.scene_sha256 = "{own}".'
+        )
+    if sha256.lower() not in ("any", own):
+        raise ValueError(f've.scene = "{path}" is not the file of ve.scene_sha256, its own is {own}; get it again, or correct the case.')
     try:
         O.load(str(path))
     except Exception as error:
@@ -34,8 +46,8 @@ def run_script(O, path, arguments, steps, seconds, memory, output):
     Windows are not opened: yade.qt is replaced by a module that answers to any name. A simulation left running in the
     background, or never started (left to a user's press on "play"), goes on until its own hooks pause it. The script is
     stopped where it is when its scene has made `steps` DEM steps, or, for want of steps, after `seconds` of wall time; it may
-    end its process in whatever way: the scene is then what it is at that moment. `memory` [GB] and `output` [MB]: see
-    script_limits.py.
+    end its process in whatever way: the scene is then what it is at that moment. A call that cannot be interrupted is ended
+    with the process, by SIGALRM, GRACE later. `memory` [GB] and `output` [MB]: see script_limits.py.
     Returns (sentences on what was special, {file that it read: hash}). Raises ValueError when the script is missing, fails, or
     one of its hooks does.
     """
@@ -44,6 +56,8 @@ def run_script(O, path, arguments, steps, seconds, memory, output):
     names = _main_module(O, path, arguments)
     here, notes, run_calls, graphics = os.getcwd(), [], [], drop_nothings(O)
     undo = [_limit_steps(O, steps, run_calls), catch_exits(O), graphics]
+    if not cut_off_network():
+        notes.append("the script could reach the network: this system does not let it be cut off")
     with recorded(O, path) as recorder, Limits(memory, output) as limits:
         try:
             _run_it(O, path, names, run_calls, seconds, notes)
@@ -84,6 +98,8 @@ def _run_it(O, path, names, run_calls, seconds, notes):
     clock = threading.Timer(seconds, _interrupt, (O, threading.get_ident()))
     clock.daemon = True
     clock.start()
+    woken = signal.signal(signal.SIGUSR2, lambda *_: None)  # out of a sleep, or a wait for what the script has started
+    signal.setitimer(signal.ITIMER_REAL, seconds + GRACE)
     try:
         exec(compile(Path(path).read_bytes(), str(path), "exec"), names)
         if O.iter == 0 and not run_calls and O.engines:
@@ -94,6 +110,10 @@ def _run_it(O, path, names, run_calls, seconds, notes):
     except _EnoughSteps:
         pass
     except _TimeUp:
+        if O.iter == 0:
+            raise ValueError(
+                f've.script = "{path}" made no DEM step in ve.script_seconds = {seconds:g} s; let its simulation run, or give it more time.'
+            ) from None
         notes.append(f"the script's simulation was stopped after {seconds:g} s")
     except (Exception, KeyboardInterrupt, SystemExit, Left) as error:
         if not left(error):
@@ -102,6 +122,8 @@ def _run_it(O, path, names, run_calls, seconds, notes):
         notes.append("the script called exit" + (" in one of its hooks: adopted as it was then" if in_hook else ""))
     finally:
         clock.cancel()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGUSR2, woken)
 
 
 def _failure(path, error):
@@ -170,6 +192,7 @@ def _interrupt(O, thread):
     """Makes `thread` leave a blocking O.run or O.wait and raise _TimeUp."""
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_TimeUp))
     O.pause()
+    signal.pthread_kill(thread, signal.SIGUSR2)
 
 
 def _prepare_runtime(argv):

@@ -26,7 +26,7 @@ import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "script_memory": 8.0, "script_output": 100.0}  # of what a case leaves out
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "scene_sha256": ""}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
@@ -157,7 +157,7 @@ class Engine:
             packing.prepare(self.O, spec)
             return [], {}
         if spec["source"] == "scene":
-            user_scenes.load_scene(self.O, spec["scene"])
+            user_scenes.load_scene(self.O, spec["scene"], spec["scene_sha256"])
             return [], {}
         if spec["source"] == "script":
             limits = [spec["script_" + what] for what in ("steps", "seconds", "memory", "output")]

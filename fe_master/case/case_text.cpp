@@ -128,6 +128,7 @@ void describe_as_table(std::string& out, const Section<S>& section, bool array) 
 void forget_places(VeParameters& ve) {
   ve.script = hash_text(read_file(ve.script));
   ve.scene = hash_text(read_file(ve.scene));
+  ve.scene_sha256.clear();
   ve.engine = {};
   ve.check_every = ve.threads = 0;
   ve.balance = true;

@@ -28,6 +28,9 @@ struct VeParameters {
   std::vector<std::string> arguments;  ///< command-line arguments of the script
   int script_steps = 1'000'000;        ///< DEM steps after which the script is stopped
   double script_seconds = 600.0;       ///< the same, for a script that makes no steps [s]
+  double script_memory = 8.0;          ///< that the script may allocate [GB]
+  double script_output = 100.0;        ///< that the script may print, and write into one file [MB]
+  std::string scene_sha256;            ///< of the scene's file, or "any": who is asked to load it trusts it
   int spheres = 1000;
   double size_ratio = 1.5;                        ///< largest over smallest diameter [-]
   double kappa = 500.0;                           ///< k_n / (sigma_0 a) [-]

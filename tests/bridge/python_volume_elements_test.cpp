@@ -342,6 +342,7 @@ TEST(PythonVolumeElements, TemplatesThatFailAreUsersMistakes) {
   };
   EXPECT_EQ(sentence("mistake"), "script theirs.py, line 3: no periodic cell; set O.periodic = True.");
   EXPECT_NE(sentence("crash").find("signal 11"), std::string::npos);
+  EXPECT_NE(sentence("alarm").find("script is within a call that cannot be interrupted"), std::string::npos);
   EXPECT_NE(sentence("endless").find("signal 9"), std::string::npos);
   EXPECT_EQ(points.make_template(kPlain).manifest, R"({"source": "dummy"})");
 }

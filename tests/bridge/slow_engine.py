@@ -2,6 +2,7 @@
 
 import os
 import resource
+import signal
 import time
 
 from dummy_engine import DummyEngine
@@ -21,6 +22,8 @@ class TemplateEngine(DummyEngine):
     def make_template(self, spec):
         if spec.get("script") == "crash":
             self._fault(0, "segv")
+        if spec.get("script") == "alarm":
+            os.kill(os.getpid(), signal.SIGALRM)
         if spec.get("script") == "endless":
             time.sleep(3600)
         if spec.get("script") == "mistake":

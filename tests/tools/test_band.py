@@ -53,6 +53,12 @@ class Synthetic(unittest.TestCase):
         values = gaussian(x, -55, 0.2) + 0.4 * gaussian(x, 55, 0.2)
         self.expect(measure_band(x, values), -55, 0.2, relative=0.08, degrees=0.5)
 
+    def test_a_hot_corner_does_not_mislead(self):
+        x = structured()
+        corner = np.linalg.norm(x - (1, 0), axis=1)
+        values = gaussian(x, -52, 0.5, (0.5, 0.7)) + 4 * np.exp(-((corner / 0.3) ** 2))
+        self.expect(measure_band(x, values), -52, 0.5, relative=0.08, degrees=3)
+
     def test_noise(self):
         x = structured()
         values = gaussian(x, 51, 0.3) + 0.1 * np.random.default_rng(2).normal(size=len(x))

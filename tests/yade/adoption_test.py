@@ -1,5 +1,6 @@
 """Users' scenes and scripts as volume elements, and the true reason where one cannot serve."""
 
+import hashlib
 import os
 import random
 import tempfile
@@ -77,7 +78,7 @@ class Script(Folder):
         self.assertEqual(made[0]["manifest"]["notes"][0], "the script's simulation was stopped after 20000 steps")
         self.assertEqual(made[0]["manifest"]["stress"], made[1]["manifest"]["stress"])
         spec = {**self.script("while True:\n    pass"), "script_seconds": 1.0}
-        with self.assertRaisesRegex(ValueError, "no contacts"):
+        with self.assertRaisesRegex(ValueError, "made no DEM step in ve.script_seconds = 1 s"):
             engine().make_template(spec)
 
     def test_an_error_of_a_hook_is_the_reason(self):
@@ -133,6 +134,15 @@ class Scene(Folder):
         broken.write_text("<nothing/>")
         with self.assertRaisesRegex(ValueError, "cannot be loaded"):
             engine().make_template(users("scene", broken))
+
+    def test_an_archive_is_loaded_by_its_checksum_alone(self):
+        path, another = self.folder / "theirs.xml", "0" * 64
+        path.write_text("<nothing/>")
+        own = hashlib.sha256(path.read_bytes()).hexdigest()
+        for given, reason in (("", f'if you trust it write ve.scene_sha256 = "{own}"'), (another, f"is not the file .* its own is {own}"),
+                              (own.upper(), "cannot be loaded")):
+            with self.subTest(given), self.assertRaisesRegex(ValueError, reason):
+                engine().make_template(users("scene", path, scene_sha256=given))
 
 
 @unittest.skipUnless(EXAMPLES.is_dir(), "YADE's examples are not installed")

@@ -31,7 +31,7 @@ def packing(**changes):
 
 def users(source, path, **more):
     """Whole specification of a user's `script` or `scene`."""
-    limits = {"script_steps": 1_000_000, "script_seconds": 600.0, "script_memory": 8.0, "script_output": 100.0}
+    limits = {"script_steps": 1_000_000, "script_seconds": 600.0, "script_memory": 8.0, "script_output": 100.0, "scene_sha256": "any"}
     return {"source": source, source: str(path), "time_step_safety": PACKING["time_step_safety"], **limits, **more}
 
 

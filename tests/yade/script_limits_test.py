@@ -2,8 +2,10 @@
 
 import os
 import threading
+import time
 import unittest
 from pathlib import Path
+from unittest import mock
 
 from cells import engine, users
 from public_cases_test import DEFAULTS, SCRIPT, Scripts
@@ -60,6 +62,20 @@ class Limits(Scripts):
         after = os.dup(1)
         os.close(after)
         self.assertEqual(after, before)  # no descriptor is left open
+
+    def test_a_sleep_for_ever(self):
+        for forever in ("time.sleep(1000)", "subprocess.run(['sleep', '1000'])", "while True: pass"):
+            began = time.monotonic()
+            self.refused("made no DEM step in ve.script_seconds = 1 s", {"script_seconds": 1.0}, bodies="import time, subprocess\n" + forever)
+            self.assertLess(time.monotonic() - began, 15)
+
+    @unittest.skipIf(os.system("unshare --net true || unshare --user --net true"), "this system does not let a process leave the network")
+    def test_no_network(self):
+        self.refused("failed: OSError: .*Network is unreachable", bodies="import socket\nsocket.create_connection(('127.0.0.1', 9))")
+
+    def test_a_network_that_stays_is_noted(self):
+        with mock.patch("user_scenes.cut_off_network", lambda: False):
+            self.assertIn("the script could reach the network", self.make()["manifest"]["notes"][0])
 
     def test_standard_input_is_empty(self):
         self.refused("failed: EOFError|failed: OSError", bodies="input('how many? ')")

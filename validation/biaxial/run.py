@@ -31,7 +31,7 @@ PAPER = {
     "first_gradient_512": Row("first_gradient_512.toml", text="16 x 32 Q8"),
 }
 AUTHORS_CONTACTS = ("ve.contact_law=paper", "ve.new_contacts=adhesive", "ve.viscous_damping=0.2", "ve.damping=0", "ve.start_at_rest=true",
-                    "ve.hold_steps=10")
+                    "ve.hold_steps=50")
 SENSITIVITY = {
     "ve_friction": Row("ve_friction.toml", text="the volume element at twice its confinement: friction angle", path=True),
     "rate_5e-3": Row("128.toml", ("ve.inertial_number=5e-3",), "128 at a quarter of the rate"),
@@ -160,6 +160,25 @@ def draw_curves(runs, names, file):
     plt.close(figure)
 
 
+VARIED = {"packing": ("packing_", "pool"), "D": ("D_",), "increment, rate": ("increment_", "rate_"), "contact law": ("paper_law", "authors_")}
+
+
+def draw_sensitivity(runs, file):
+    """The curve of 128 elements in each panel, beside what one thing changes of it."""
+    figure, panels = plt.subplots(1, len(VARIED), figsize=(14, 3.4), sharey=True, constrained_layout=True)
+    for axes, (title, kinds) in zip(panels, VARIED.items()):
+        for name in ["128", *(name for name in SENSITIVITY if name.startswith(kinds))]:
+            if name in runs:
+                curve = curve_of(name, runs[name])
+                axes.plot(100 * curve.strain, curve.stress, "k-" if name == "128" else "-", linewidth=1, label=name)
+        axes.set(title=title, xlabel="axial strain [%]")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=7)
+    panels[0].set_ylabel(r"axial force / ($\sigma_0 W$)")
+    figure.savefig(file, dpi=80)
+    plt.close(figure)
+
+
 def draw_maps(runs, names, file):
     """Side by side at the largest strain that all of them have, with one scale."""
     common = max(set.intersection(*(set(output_steps(runs[name].folder)) for name in names)))
@@ -205,8 +224,8 @@ def report(c):
         draw_maps(runs, first, c.product("maps_first_gradient.png"))
     if second := [name for name in ("128", "512") if name in runs]:
         draw_profiles(runs, second, c.product("profiles.png"))
-    if asked := [name for name in SENSITIVITY if name in specimens]:
-        draw_curves(runs, [name for name in ("128", *asked) if name in runs], c.product("sensitivity.png"))
+    if "128" in runs and any(name in specimens for name in SENSITIVITY):
+        draw_sensitivity(runs, c.product("sensitivity.png"))
     return HEADER + [table_row(name, run) for name, run in runs.items() if name != "ve_friction"] + claims(runs)
 
 

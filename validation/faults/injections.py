@@ -32,6 +32,7 @@ class Fault:
     limits: dict = field(default_factory=dict)  #: resource -> bytes
     ranks: int = 1
     cuts: bool = False  #: a struck step may be done again in smaller steps: other steps than the reference's
+    apart: tuple = ()  #: data sets that are not compared
     destroys: bool = False  #: takes results away that nothing can bring back: the run is to notice
 
 
@@ -94,14 +95,15 @@ def steps_in(found):
     return sorted({int(name.split("/")[1]) for name in found if name.startswith("steps/")}) if found else []
 
 
-def same_bits(folder, reference):
-    """Empty, or what differs first."""
+def same_bits(folder, reference, apart=()):
+    """Empty, or what differs first, the data sets of those names apart."""
     ours, theirs = history(folder), history(reference)
     if ours != theirs:
         return f"history.csv: {len(ours)} rows of {len(theirs)}, or others"
     mine, its = fields(folder), fields(reference)
     if mine is None or mine.keys() != its.keys():
         return "results.h5: other data sets"
+    its = {name: values for name, values in its.items() if name.rsplit("/", 1)[-1] not in apart}
     return next((name for name in its if its[name].tobytes() != mine[name].tobytes()), "")
 
 
@@ -132,7 +134,16 @@ def near(folder, reference):
 
 def inject(place, fault):
     """What came of it: {status, said, readable, steps, restart, differs, way}."""
-    reference, folder = place.reference(fault), place.work / "struck"
+    folder = place.work / "struck"
+    try:
+        return _inject(place, fault, folder)
+    finally:
+        if os.path.ismount(folder):  # a small disk
+            subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def _inject(place, fault, folder):
+    reference = place.reference(fault)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     undo = fault.prepare(folder) if fault.prepare else None
@@ -145,7 +156,7 @@ def inject(place, fault):
             undo()
     seen = {"status": status, "said": said[-300:], "rows": len(rows), "readable": found is not None, "in_results": len(steps_in(found))}
     if status == 0:
-        differs = same_bits(folder, reference)
+        differs = same_bits(folder, reference, fault.apart)
         if fault.destroys and differs:
             return {**seen, "way": "went on", "differs": "results were taken away, and the run did not notice"}
         if not differs:

@@ -30,8 +30,8 @@ PAPER = {
     "1280": Row("1280.toml", text="32 x 40 second gradient: Fig. 6c", checkpoint_every=0)  # memory: README.md,
 }
 UNIQUENESS = {
-    f"start_{mesh}_{n}": Row(f"{mesh}.toml", ("solver.start_amplitude=0.3", "solver.start_time=0.6", f"solver.start_seed={n}", "control.end_time=1.4"),
-                             f"{mesh}, random start {n} of the step past sigma_int = 2.8 sigma_0, to where the bands are formed", checkpoint_every=0)
+    f"start_{mesh}_{n}": Row(f"{mesh}.toml", ("solver.start_amplitude=0.05", "solver.start_time=0.85", f"solver.start_seed={n}", "control.end_time=1.4"),
+                             f"{mesh}, random start {n} of the step past sigma_int = 3.55 sigma_0, to where the bands are formed", checkpoint_every=0)
     for mesh in (870, 1280) for n in (1, 2, 3, 4, 5)
 }
 CELL = {
@@ -139,14 +139,15 @@ def draw_curves(runs, names, file):
 
 def draw_maps(runs, names, file, reach=3.5):
     """The inner part of the deformed meshes at the end of the loading, one scale."""
-    figure, panels = plt.subplots(1, len(names), figsize=(4.0 * len(names), 4.8), squeeze=False)
+    side = 4.0 if len(names) <= 3 else 2.4
+    figure, panels = plt.subplots(1, len(names), figsize=(side * len(names), 1.2 * side), squeeze=False)
     steps = {name: output_steps(runs[name].folder)[-1] for name in names}
     fields = {name: read_step(runs[name].folder, steps[name]) for name in names}
     top = max(np.quantile(field.fields["strain_invariant"], 0.998) for field in fields.values())
     for axes, name in zip(panels[0], names):
         draw_map(axes, read_mesh(runs[name].folder), fields[name], "strain_invariant", (0, reach, 0, reach), (0, top))
         level = pressure_curve(runs[name].folder).stress[steps[name] - 1]
-        axes.set_title(f"{TITLES.get(name, name)}\n" rf"$\sigma_{{int}}$ = {level:.2f} $\sigma_0$", fontsize=9)
+        axes.set_title(f"{TITLES.get(name, name)}\n" rf"$\sigma_{{int}}$ = {level:.2f} $\sigma_0$", fontsize=9 if side == 4.0 else 7)
     figure.savefig(file, dpi=75, bbox_inches="tight")
     plt.close(figure)
 
@@ -162,7 +163,9 @@ def report(c):
         draw_curves(runs, shown, c.product("curves.png"))
         draw_maps(runs, shown, c.product("maps.png"))
     if starts := [name for name in UNIQUENESS if name in with_fields]:
-        draw_maps(runs, starts, c.product("uniqueness.png"))
+        for mesh in ("870", "1280"):
+            if of_mesh := [name for name in starts if mesh in name]:
+                draw_maps(runs, of_mesh, c.product(f"uniqueness_{mesh}.png"))
     lines = HEADER + [table_row(name, run) for name, run in runs.items()] + ["", *BANDS]
     for name, run in with_fields.items():
         lines += band_lines(name, run)

@@ -10,10 +10,10 @@ import subprocess
 import time
 from dataclasses import dataclass
 
-import numpy as np
-
 import campaign
 from campaign import ENVIRONMENT, CampaignError
+
+import numpy as np
 
 CLOCKS = ("dem_seconds", "wall_s")  # columns that hold times of the machine
 

@@ -22,15 +22,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "fe_master" / "program"))  # results, band, plot
 
+ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+os.environ.update(ONE_CORE)  # before NumPy is loaded: on a busy machine its threads wait for each other, a hundred times as long
+
 import matplotlib
 
 matplotlib.use("Agg")
 
 from results import ResultsError, read_history
 
-ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 ANY_RANKS = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-ENVIRONMENT = os.environ | ONE_CORE | ANY_RANKS
+ENVIRONMENT = os.environ | ANY_RANKS
 KEPT = (0, 2, 3)  # exit status: done, bad input, not converged; a failed volume element (4) may have been the machine's fault
 
 
