@@ -11,6 +11,7 @@
 #include "errors.hpp"
 #include "formulation.hpp"
 #include "mesh.hpp"
+#include "preset.hpp"
 
 namespace femxdem {
 
@@ -240,7 +241,10 @@ void check_region_names(const std::vector<R>& regions, const std::string& sectio
 // ---- control, solver, monitors
 
 void check_control(const Case& c, Mistakes& m) {
-  require(m, "control", {"end_time", "step"}, "s");
+  require(m, "control", {"end_time"}, "s");
+  if (!is_given(c.control.step))
+    require(m, "control", {"step"},
+            c.ve.preset == VePreset::none ? "s" : "s; a preset finds it where edges of a rectangle are moved in time");
   if (c.control.step > c.control.end_time) m.add("control.step", "control.step is above end_time; lower it");
   if (c.control.min_step > c.control.step) m.add("control.min_step", "control.min_step is above step; lower it");
   if (c.control.max_step < c.control.step) m.add("control.max_step", "control.max_step is below step; raise it");
@@ -385,31 +389,16 @@ void require_known(const std::string& name, const std::set<std::string>& known, 
                                         : fmt::format("the {}s are {}", noun, list)));
 }
 
-namespace {
-
-struct PresetSettings {
-  int spheres;
-  double inertial_number;
-};
-/// On the front of speed against accuracy as measured by validation/speed_accuracy.
-const std::map<VePreset, PresetSettings> kPresets = {
-    {VePreset::fast, {100, 2e-2}}, {VePreset::balanced, {400, 2e-2}}, {VePreset::accurate, {1000, 2e-2}}};
-
-}  // namespace
-
 void complete_case(Case& c, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
+  complete_by_preset(c, m);
   c.solver = with_default_tolerances(c.solver, ve);
   if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
   if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
   const auto complete_ve = [&](VeParameters& v, const auto& given) {
     if (v.contact_law == ContactLaw::friction && !given("cohesion")) v.cohesion = 0.0;
-    if (v.preset != VePreset::none) {
-      const PresetSettings& preset = kPresets.at(v.preset);
-      if (!given("spheres")) v.spheres = preset.spheres;
-      if (!given("inertial_number")) v.inertial_number = preset.inertial_number;
-    }
+    complete_by_preset(v, given);
     if (!v.cache.empty()) v.cache = (std::filesystem::path(c.file).parent_path() / v.cache).lexically_normal().string();
   };
   const auto given = [&m](const std::string& key) { return m.has("ve." + key); };

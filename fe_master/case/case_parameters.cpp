@@ -139,7 +139,9 @@ Section<MaterialParameters> material_section() {
 std::vector<Parameter<VeParameters>> packing_parameters() {
   using V = VeParameters;
   return {word("preset", &V::preset, {"", "fast", "balanced", "accurate"},
-               "gives spheres and inertial_number where they are not given: README of validation/speed_accuracy"),
+               "gives what is not given: spheres, inertial_number, min_steps, solver.tolerance and, for a rectangle "
+               "whose edges are moved in time, control.step; the log says its errors and its mesh: README of "
+               "validation/speed_accuracy"),
           word("source", &V::source, {"prepare", "scene", "script"},
                "prepare: a packing by the numbers below; scene: a saved one; script: a user's YADE script"),
           path("script", &V::script, "YADE script, run unchanged, then adopted"),

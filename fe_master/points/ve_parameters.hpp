@@ -21,7 +21,7 @@ enum class EngineChoice { automatic, yade, compact };
 enum class VeAnswer { end, mean };
 enum class Assignment { same, random };
 struct VeParameters {
-  VePreset preset = VePreset::none;  ///< gives spheres and inertial_number where the case does not
+  VePreset preset = VePreset::none;  ///< gives what the case does not: case/preset.hpp
   VeSource source = VeSource::prepare;
   std::string script;                  ///< user's YADE script, absolute path
   std::string scene;                   ///< saved YADE scene, absolute path

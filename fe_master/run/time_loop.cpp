@@ -92,6 +92,7 @@ int TimeLoop::go() {
                              problem_.mesh().elements.size(), points_.size(), problem_.formulation().unknowns(),
                              options_.ranks, options_.ranks > 1 ? "s" : ""));
   for (const std::string& warning : warnings(case_, problem_.mesh())) files_.log.say("warning: " + warning);
+  if (const std::string advice = preset_advice(case_, problem_.mesh()); !advice.empty()) files_.log.say(advice);
   before_ = solver_.committed();
   if (options_.existing == Existing::resume) {
     restart();

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "localisation.hpp"
+#include "preset.hpp"
 
 namespace femxdem {
 namespace {
@@ -181,6 +182,22 @@ std::vector<std::string> warnings(const Case& c, const Mesh& mesh) {
   warn_of_identical_points(c, moduli, out);
   warn_of_multiplier(c, mesh, out);
   return out;
+}
+
+std::string preset_advice(const Case& c, const Mesh& mesh) {
+  if (c.ve.preset == VePreset::none || !is_volume_element(c)) return "";
+  const Preset& p = preset(c.ve.preset);
+  std::string advice =
+      "beyond the peak a band is one element wide: no mesh is fine enough, element.type = \"second_gradient\" is";
+  if (c.element.type == ElementType::second_gradient) {
+    const double width = expected_band_width(band_modulus(make_double_stiffness(c.element)), band_moduli(c.ve));
+    advice = fmt::format("elements of at most {:.2g} m, {} across the expected band (these: {:.2g} m)",
+                         width / p.elements_across, p.elements_across, element_size(mesh));
+  }
+  return fmt::format(
+      "preset {}: erred by {:.0f} % at the peak, {:.0f} % in the residual, {:.0f} % in the band and {:.0f} % along the "
+      "curve of a biaxial test (validation/speed_accuracy); mesh: {}",
+      p.name, 100 * p.peak, 100 * p.residual, 100 * p.band, 100 * p.curve, advice);
 }
 
 }  // namespace femxdem

@@ -36,4 +36,8 @@ double band_modulus(const DoubleStiffness& law);
 /// identical points without an imperfection where the law softens; a multiplier that is not determined.
 std::vector<std::string> warnings(const Case& c, const Mesh& mesh);
 
+/// What a case's ve.preset stands for: its measured errors, and the mesh that goes with it, which it cannot set. Empty
+/// without a preset.
+std::string preset_advice(const Case& c, const Mesh& mesh);
+
 }  // namespace femxdem

@@ -5,12 +5,16 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <set>
+#include <sstream>
 
 #include "bad_cases.hpp"
 #include "case_parameters.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
+#include "own_folder.hpp"
+#include "preset.hpp"
 
 namespace femxdem {
 namespace {
@@ -216,13 +220,93 @@ TEST(Case, FrictionLawHasNoCohesionUnlessGiven) {
   EXPECT_EQ(read_case(kGood).ve.cohesion, 1.0);
 }
 
-TEST(Case, APresetGivesWhatTheCaseDoesNot) {
-  const Case fast = read_case(kGood, {"ve.preset=fast"});
-  const Case accurate = read_case(kGood, {"ve.preset=accurate"});
-  EXPECT_LT(fast.ve.spheres, accurate.ve.spheres);
-  EXPECT_NE(fast.ve.inertial_number, read_case(kGood).ve.inertial_number);
-  EXPECT_EQ(read_case(kGood, {"ve.preset=fast", "ve.spheres=321"}).ve.spheres, 321);
+class CaseWithPreset : public OwnFolder {
+ protected:
+  /// Biaxial on volume elements without a number that a preset gives: 0.1 m/s on 2 m.
+  std::string file() const {
+    fs::create_directories(folder_);
+    std::ofstream(folder_ / "preset.toml")
+        << "mesh = { type = \"rectangle\", width = 1.0, height = 2.0, nx = 2, ny = 4 }\n"
+           "load = [ { edge = \"bottom\", kind = \"displacement\", component = \"y\", value = 0.0 },\n"
+           "         { edge = \"top\", kind = \"velocity\", component = \"y\", value = -0.1 },\n"
+           "         { point = [0.5, 0.0], kind = \"displacement\", component = \"x\", value = 0.0 } ]\n"
+           "control = { end_time = 1.0 }\n";
+    return (folder_ / "preset.toml").string();
+  }
+};
+
+/// The table of presets in validation/speed_accuracy/README.md.
+TEST_F(CaseWithPreset, GetsWhatItDoesNotGive) {
+  struct Row {
+    const char* name;
+    int spheres;
+    double inertial_number;
+    int min_steps;
+    double increment, tolerance;
+  };
+  for (const Row& row : {Row{"fast", 100, 2e-2, 10, 2e-3, 1e-2}, Row{"balanced", 400, 2e-2, 3, 1e-3, 5e-3},
+                         Row{"accurate", 1000, 2e-2, 3, 2.5e-4, 5e-3}}) {
+    SCOPED_TRACE(row.name);
+    const Case c = read_case(file(), {std::string("ve.preset=") + row.name});
+    EXPECT_EQ(c.ve.spheres, row.spheres);
+    EXPECT_EQ(c.ve.inertial_number, row.inertial_number);
+    EXPECT_EQ(c.ve.min_steps, row.min_steps);
+    EXPECT_EQ(c.solver.tolerance, row.tolerance);
+    EXPECT_NEAR(c.control.step, row.increment / 0.05, 1e-15) << "0.05 of strain in a second";
+    EXPECT_EQ(c.control.max_step, c.control.step);
+  }
   EXPECT_NE(mistakes_of(kGood, {"ve.preset=quick"}).find("balanced"), std::string::npos);
+}
+
+/// Rows of validation/speed_accuracy/README.md: name, settings, errors in percent.
+TEST_F(CaseWithPreset, IsThatOfItsPage) {
+  std::ifstream page(fs::path(TEST_CASES).parent_path().parent_path() / "validation/speed_accuracy/README.md");
+  std::map<std::string, std::vector<double>> rows;
+  for (std::string line; std::getline(page, line);) {
+    if (line.rfind("| `", 0) != 0) continue;
+    const std::string name = line.substr(3, line.find('`', 3) - 3);
+    std::istringstream cells(line.substr(line.find('|', 3) + 1));
+    for (std::string cell; rows[name].size() < 10 && std::getline(cells, cell, '|');)
+      rows[name].push_back(std::stod(cell));
+  }
+  for (const VePreset which : {VePreset::fast, VePreset::balanced, VePreset::accurate}) {
+    const Preset& p = preset(which);
+    SCOPED_TRACE(p.name);
+    const std::vector<double> own = {
+        double(p.spheres),         p.inertial_number, double(p.min_steps), p.increment,  p.tolerance,
+        double(p.elements_across), 100 * p.peak,      100 * p.residual,    100 * p.band, 100 * p.curve};
+    ASSERT_EQ(rows[p.name].size(), own.size());
+    for (std::size_t i = 0; i < own.size(); ++i) EXPECT_NEAR(rows[p.name][i], own[i], 1e-12) << "column " << i + 1;
+  }
+}
+
+TEST_F(CaseWithPreset, KeepsWhatItGives) {
+  const Case c = read_case(file(), {"ve.preset=fast", "ve.spheres=321", "ve.inertial_number=3e-3", "ve.min_steps=7",
+                                    "solver.tolerance=2e-3", "control.step=0.01"});
+  EXPECT_EQ(c.ve.spheres, 321);
+  EXPECT_EQ(c.ve.inertial_number, 3e-3);
+  EXPECT_EQ(c.ve.min_steps, 7);
+  EXPECT_EQ(c.solver.tolerance, 2e-3);
+  EXPECT_EQ(c.control.step, 0.01);
+  const Case law = read_case(kGood, {"ve.preset=fast"});
+  EXPECT_EQ(law.solver.tolerance, 1e-8) << "a preset is of volume elements";
+  EXPECT_EQ(law.control.step, read_case(kGood).control.step);
+}
+
+TEST_F(CaseWithPreset, GetsAStepWhereItsEdgesAreMovedInTime) {
+  const double increment = preset(VePreset::fast).increment;
+  const auto step = [&](std::vector<std::string> words) {
+    words.push_back("ve.preset=fast");
+    return read_case(file(), words).control.step;
+  };
+  EXPECT_NEAR(step({"load.1.kind=displacement"}), increment / 0.05, 1e-15) << "value at end_time = 1 s";
+  EXPECT_NEAR(step({"load.1.table=[[0.0, 0.0], [0.5, 2.0], [1.0, 2.0]]"}), increment / 0.2, 1e-15)
+      << "0.4 m/s at first";
+  EXPECT_NEAR(step({"load.0.value=0.1"}), increment / 0.1, 1e-15) << "both edges";
+  EXPECT_EQ(step({"load.1.value=-1e-4"}), 1.0) << "not beyond the end";
+  EXPECT_NE(mistakes_of(file(), {"ve.preset=fast", "load.1.value=0.0"}).find("control.step is missing"),
+            std::string::npos);
+  EXPECT_NE(mistakes_of(file()).find("control.step is missing; give it (s)"), std::string::npos);
 }
 
 TEST(Load, FactorFollowsItsTableOrItsKind) {

@@ -1,9 +1,12 @@
 #include "warnings.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "preset.hpp"
 
 namespace femxdem {
 namespace {
@@ -62,6 +65,23 @@ TEST(Warnings, CoarseMeshIsSaidWithTheNumbers) {
   EXPECT_TRUE(says(coarse, "elements of 0.125 m"));
   EXPECT_FALSE(says(warnings(softening_case(0.05), rectangle_mesh(1, 2, 16, 32)), "expected band"));
   EXPECT_FALSE(says(warnings(softening_case(0.5), mesh), "expected band"));
+}
+
+/// w = 2 sqrt(4e3 N / 1.4e5 Pa) (pi - atan sqrt(1.4 / 500)) = 1.044 m.
+TEST(Warnings, APresetSaysItsErrorsAndItsMesh) {
+  Case c = softening_case(4e3);
+  c.material.type = MaterialType::volume_element;
+  const Mesh mesh = rectangle_mesh(1, 2, 4, 8);
+  EXPECT_EQ(preset_advice(c, mesh), "");
+  c.ve.preset = VePreset::fast;
+  const std::string advice = preset_advice(c, mesh);
+  EXPECT_NE(advice.find(fmt::format("preset fast: erred by {:.0f} % at the peak", 100 * preset(VePreset::fast).peak)),
+            std::string::npos)
+      << advice;
+  EXPECT_NE(advice.find("elements of at most 0.26 m, 4 across the expected band (these: 0.25 m)"), std::string::npos)
+      << advice;
+  c.element.type = ElementType::q8;
+  EXPECT_NE(preset_advice(c, mesh).find("no mesh is fine enough"), std::string::npos);
 }
 
 TEST(Warnings, IdenticalPointsThatSoftenAreSaid) {

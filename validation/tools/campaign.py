@@ -88,7 +88,7 @@ class Campaign:
         self.program, self.ranks, self.anew = arguments.femxdem.resolve(), arguments.ranks, arguments.anew
         self.recorded = arguments.record
         self.processor_seconds = 0.0  # of all runs, those that were kept included
-        self._products, self._table = [], None
+        self._products, self._tables = [], {}
         self.runs.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -185,20 +185,18 @@ class Campaign:
     def table(self, lines, page="README.md", mark="results"):
         """The lines of the campaign's Markdown table, as far as it has come, and where --record puts them: on a page of the
         folder between <!-- results --> and <!-- end of results -->."""
-        self._table = list(lines), page, mark
+        self._tables[page, mark] = list(lines)
         (self.runs / "table.md").write_text("\n".join(lines) + "\n")
 
     def record(self):
         """Puts figures, numbers and the table into the folder; as table.md where the page has no place for it."""
         for file_name in self._products:
             shutil.copy(self.runs / file_name, self.home / file_name)
-        if self._table is None:
-            return
-        lines, page, mark = self._table
-        if f"<!-- {mark} -->" in (self.home / page).read_text():
-            write_between_marks(self.home / page, lines, f"{self.processor_seconds:.0f} s of processor time", mark=mark)
-        else:
-            shutil.copy(self.runs / "table.md", self.home / "table.md")
+        for (page, mark), lines in self._tables.items():
+            if f"<!-- {mark} -->" in (self.home / page).read_text():
+                write_between_marks(self.home / page, lines, f"{self.processor_seconds:.0f} s of processor time", mark=mark)
+            else:
+                (self.home / "table.md").write_text("\n".join(lines) + "\n")
 
 
 def _processor_seconds():
