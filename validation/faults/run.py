@@ -220,9 +220,10 @@ def row(name, what, found):
     statuses = sorted({str(f["status"]) for f in found if f["status"] != 0})
     ended = sum(f["status"] != 0 for f in found)
     wrong = sum(bool(f["differs"]) for f in found)
+    steps = sum(f["differs"].startswith("history.csv") for f in found)
     lost = sum(f["rows"] > 0 and not f["readable"] and f["way"] != "noticed" for f in found)  # there the fault itself took it
     return (f"| {name} | {what} | {len(found)} | {ways('went on')} | {ways('smaller steps')} | {ended} ({', '.join(statuses)}) | "
-            f"{ways('--restart')} / {ways('--overwrite')} | {ways('noticed')} | {wrong} | {lost} | {wrong} |")
+            f"{ways('--restart')} / {ways('--overwrite')} | {ways('noticed')} | {steps} | {lost} | {wrong} |")
 
 
 if __name__ == "__main__":
