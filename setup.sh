@@ -71,7 +71,7 @@ build() {
 
 install_program() {
   [[ -n ${1:-} ]] || fail "install wants a folder, such as /usr/local or ~/femxdem" 2
-  build --target femxdem femxdem-worker compact_cell contact_network
+  build --target femxdem femxdem-worker compact_cell
   cmake --install "$BUILD" --prefix "$1"
   say "installed: $1/bin/femxdem"
 }

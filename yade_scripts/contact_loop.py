@@ -116,7 +116,7 @@ def relaxed_stiffness(c, kn, kt, volume):
     C = C of Eq. (2) - (1/V) F^T K^-1 F: minimum over the grains' u, theta of (1/2) sum d.k.d with
     d = E l + u_j - u_i - (r_i theta_i + r_j theta_j) x n. No contact slides, opens or turns (terms of order 1/kappa).
     """
-    from contact_network import released_stiffness
+    from compact_cell import released_stiffness
 
     released = released_stiffness(int(c.ids.max()) + 1, c.ids, c.normal, c.length, kn, kt, volume)
     return stiffness(c, kn, kt, volume) - released[PLACE[:, :, None, None], PLACE]

@@ -22,12 +22,16 @@ BandModuli least_moduli(const Tensor4& tangent, const Tensor4& elastic) {
   for (int direction = 0; direction < 180; ++direction) {
     const double angle = direction * std::numbers::pi / 180;
     const Eigen::Vector2d n(std::cos(angle), std::sin(angle));
-    const Eigen::EigenSolver<Eigen::Matrix2d> eigen(acoustic_tensor(tangent, n));
-    for (int i = 0; i < 2; ++i) {
-      if (eigen.eigenvalues()[i].imag() != 0 || eigen.eigenvalues()[i].real() >= -moduli.softening) continue;
-      const Eigen::Vector2d g = eigen.eigenvectors().col(i).real();
-      moduli = {-eigen.eigenvalues()[i].real(), g.dot(acoustic_tensor(elastic, n) * g)};
-    }
+    const Eigen::Matrix2d A = acoustic_tensor(tangent, n);
+    const double half = 0.5 * A.trace(), root = half * half - A.determinant();
+    if (root < 0) continue;  // complex
+    const double least = half - std::sqrt(root);
+    if (least >= -moduli.softening) continue;
+    // (A - l) g = 0: g is normal to the longer row of A - l.
+    const Eigen::Matrix2d rest = A - least * Eigen::Matrix2d::Identity();
+    const Eigen::RowVector2d row = rest.row(rest.row(0).norm() >= rest.row(1).norm() ? 0 : 1);
+    const Eigen::Vector2d g = Eigen::Vector2d(-row[1], row[0]).normalized();
+    moduli = {-least, g.dot(acoustic_tensor(elastic, n) * g)};
   }
   return moduli;
 }
