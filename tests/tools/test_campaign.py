@@ -134,7 +134,7 @@ class Options(Folder):
 
         self.main(work=work)
         self.assertIn("old", page.read_text())
-        sys_argv, sys.argv = sys.argv, [str(ROOT / "validation" / "one" / "run.py"), "--seeds", "1", "--record"]
+        sys_argv, sys.argv = sys.argv, [str(ROOT / "validation" / "one" / "run.py"), "--seeds", "1", "--runs", "here", "--record"]
         try:
             self.main("--record", work=work)
         finally:

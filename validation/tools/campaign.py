@@ -205,13 +205,24 @@ def _processor_seconds():
     return sum(use.ru_utime + use.ru_stime for use in uses)
 
 
+def given_words(arguments):
+    """What a campaign was asked for, without --record and the folders of a machine."""
+    words, following = [], iter(arguments)
+    for word in following:
+        if word in ("--runs", "--femxdem"):
+            next(following, None)
+        elif word != "--record" and not word.startswith(("--runs=", "--femxdem=")):
+            words.append(word)
+    return words
+
+
 def write_between_marks(page, lines, cost, words=None, mark="results"):
     """Replaces what stands between the marks of a page by a line of date, machine, cost and command (with `words` for those
     of the command line), and the table."""
     text, begin, end = page.read_text(), f"<!-- {mark} -->", f"<!-- end of {mark} -->"
     if begin not in text or end not in text:
         raise CampaignError(f"{page}: no place for the table; put {begin} and {end} on two lines of it")
-    words = [word for word in sys.argv[1:] if word != "--record"] if words is None else words
+    words = given_words(sys.argv[1:]) if words is None else words
     command = " ".join([str(Path(sys.argv[0]).resolve().relative_to(ROOT)), *words])
     note = f"{time.strftime('%Y-%m-%d')}, {processor()}, {cost}: `{command}`"
     page.write_text("\n".join([text.split(begin)[0] + begin, note, "", *lines, end]) + text.split(end)[1])
