@@ -79,6 +79,17 @@ Numbers released_stiffness(std::int64_t grains, const Indices& ids, const Number
   return result;
 }
 
+void define_released_stiffness(py::module_& module) {
+  module.def(
+      "released_stiffness", &released_stiffness, py::arg("grains"), py::arg("ids"), py::arg("normal"),
+      py::arg("length"), py::arg("kn"), py::arg("kt"), py::arg("volume"),
+      "What the stiffness of a periodic contact network loses when its grains move and spin into equilibrium:\n"
+      "(1/V) F^T K^-1 F, (6, 6) [Pa] over the strain components xx, yy, zz, xy, yz, zx (tensor, not engineering),\n"
+      "K and F the network's stiffness and loads under a unit strain.\n"
+      "ids (m, 2), normal (m, 3) from the first to the second, length (m,) of the branch vectors [m], kn, kt\n"
+      "(m,) [N/m], volume [m^3].");
+}
+
 }  // namespace
 
 PYBIND11_MODULE(compact_cell, module) {
@@ -90,14 +101,7 @@ PYBIND11_MODULE(compact_cell, module) {
   module.def("kernels", &femxdem::kernels, "The kernels that this processor has, slowest first.");
   module.def("use_kernel", &femxdem::use_kernel);
   module.def("kernel_in_use", &femxdem::kernel_in_use);
-  module.def(
-      "released_stiffness", &released_stiffness, py::arg("grains"), py::arg("ids"), py::arg("normal"),
-      py::arg("length"), py::arg("kn"), py::arg("kt"), py::arg("volume"),
-      "What the stiffness of a periodic contact network loses when its grains move and spin into equilibrium:\n"
-      "(1/V) F^T K^-1 F, (6, 6) [Pa] over the strain components xx, yy, zz, xy, yz, zx (tensor, not engineering),\n"
-      "K and F the network's stiffness and loads under a unit strain.\n"
-      "ids (m, 2), normal (m, 3) from the first to the second, length (m,) of the branch vectors [m], kn, kt\n"
-      "(m,) [N/m], volume [m^3].");
+  define_released_stiffness(module);
   py::class_<CompactCell>(module, "CompactCell", "See bridge/compact_cell.hpp.")
       .def_static("from_scene",
                   [](const py::bytes& exported) { return CompactCell::from_scene(std::string(exported)); })
