@@ -30,10 +30,13 @@ std::string unstrained(const Tensor2& F) {
       F(0, 0), F(0, 1), F(0, 2), F(1, 0), F(1, 1), F(1, 2), F(2, 0), F(2, 1), F(2, 2), F.determinant());
 }
 
+/// Of a tensor whose eigenvalues are real and positive; Eigen's is compiled here alone.
+Tensor2 logarithm(const Tensor2& A) { return A.log(); }
+
 }  // namespace
 
 NetworkLevel network_level(const Tensor2& stretch, const Tensor2& stress) {
-  const double strain = 0.5 * Tensor2((stretch.transpose() * stretch).log()).norm();
+  const double strain = 0.5 * logarithm(stretch.transpose() * stretch).norm();
   const double pressure = -stress.trace() / 3;
   const double level = pressure > 0 ? std::floor(std::log2(pressure)) : -1e3;
   return {static_cast<int>(strain / 0.02), static_cast<int>(level)};
@@ -50,7 +53,7 @@ Straining plan_straining(const VolumeElementOptions& options, StrainedPoint& poi
   plan.R = polar.R;
   plan.U = options.quantised ? quantised(polar.U) : polar.U;
   // ln of U U_n^-1, which is similar to a symmetric positive definite tensor: its eigenvalues are real and positive
-  const Tensor2 increment = (plan.U * point.stretch.inverse()).log();
+  const Tensor2 increment = logarithm(plan.U * point.stretch.inverse());
   const double size = increment.norm();
   if (!(size <= options.max_increment)) {
     plan.refusal =
