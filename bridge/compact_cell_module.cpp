@@ -47,8 +47,7 @@ py::dict info(const CompactCell& cell) {
 }
 
 /// Raises RuntimeError with the sentence of a failure.
-py::array_t<double> deform(CompactCell& cell, const py::array_t<double, py::array::c_style | py::array::forcecast>& L,
-                           long steps, long sample_every, double late) {
+py::array_t<double> deform(CompactCell& cell, const Numbers& L, long steps, long sample_every, double late) {
   CompactCell::Deformed deformed;
   const auto numbers = tensor(L);
   {
@@ -71,12 +70,8 @@ Numbers released_stiffness(std::int64_t grains, const Indices& ids, const Number
   std::vector<femxdem::Spring> springs;
   for (py::ssize_t c = 0; c < m; ++c)
     springs.push_back({id(c, 0), id(c, 1), {n(c, 0), n(c, 1), n(c, 2)}, l(c), k(c), s(c)});
-  const Eigen::MatrixXd released = femxdem::released_stiffness(grains, springs, volume);
-  Numbers result({6, 6});
-  auto out = result.mutable_unchecked<2>();
-  for (int a = 0; a < 6; ++a)
-    for (int b = 0; b < 6; ++b) out(a, b) = released(a, b);
-  return result;
+  const Eigen::MatrixXd released = femxdem::released_stiffness(grains, springs, volume);  // symmetric to the bit
+  return Numbers({6, 6}, released.data());
 }
 
 void define_released_stiffness(py::module_& module) {

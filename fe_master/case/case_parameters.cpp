@@ -196,8 +196,7 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
                 "an answer above is refused as unstable"),
       word("stiffness", &V::stiffness, {kStiffnessWords.begin(), kStiffnessWords.end()},
            "elastic one: affine, Eq. (2); relaxed, that of the same contacts with the grains in equilibrium; reduced, "
-           "Eq. (2) with "
-           "0.93 kn and 0.63 kt; sliding, Eq. (2) without the kt of contacts that slide"),
+           "Eq. (2) with 0.93 kn and 0.63 kt; sliding, Eq. (2) without the kt of contacts that slide"),
       word("engine", &V::engine, {"auto", "yade", "compact"},
            "what strains it: YADE, or compact cells, which make YADE's step to the bit; auto: compact where they can"),
       parameter("check_every", &V::check_every, "", kNotNegative,

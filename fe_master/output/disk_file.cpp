@@ -69,8 +69,7 @@ void AppendedFile::write(std::string_view text) {
 }
 
 bool AppendedFile::is_in_place() const {
-  struct stat named {
-  }, held{};
+  struct stat named = {}, held = {};
   return stat(file_.c_str(), &named) == 0 && fstat(descriptor_, &held) == 0 && named.st_ino == held.st_ino &&
          named.st_dev == held.st_dev && held.st_size >= size_;
 }

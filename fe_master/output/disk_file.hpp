@@ -27,7 +27,7 @@ class AppendedFile {
   std::int64_t size_ = 0;  ///< of the file after the last write
 };
 
-/// What replace_file adds to a name for the file beside it, mkostemp's letters in the place of the last six.
+/// What replace_file adds to a name for the file beside it: mkostemp's pattern, which wants these six letters.
 inline constexpr std::string_view kBeside = ".XXXXXX";
 
 /// Writes beside `file`, makes sure of the disk and renames: a reader sees the old text or the new one, never half of
