@@ -75,6 +75,7 @@ Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file), 
   }
   if (id_ < 0 && mode == Mode::create) fail_to_write("create the file", "/");
   if (id_ < 0) fail("cannot open the file as HDF5", "/");
+  errno = 0;  // from here on a reason is the one of what fails
 }
 
 Hdf5File::~Hdf5File() {
@@ -105,13 +106,17 @@ void Hdf5File::finish() {
   const hid_t id = std::exchange(id_, -1);
   if (H5Fclose(id) < 0) fail_to_write("close", "/");
   if (mode_ == Mode::update) std::filesystem::remove(undo_file(file_));
+  if (!std::filesystem::exists(file_))  // what was written has no name any more
+    throw DiskError(fmt::format("{}: has been removed or changed since the run wrote it", file_.string()));
 }
 
 void Hdf5File::fail_to_write(std::string_view what, std::string_view path) {
   const int reason = errno;
   broken_ = true;
-  throw DiskError(fmt::format("{}: cannot {} ({}): {}", file_.string(), what, path,
-                              reason != 0 ? std::strerror(reason) : "refused by HDF5"));
+  const bool has_reason = reason != 0 && reason != ENOENT;  // else HDF5 does not find what it has written
+  throw DiskError(
+      fmt::format("{}: cannot {} ({}): {}", file_.string(), what, path,
+                  has_reason ? std::strerror(reason) : "has been removed or changed since the run wrote it"));
 }
 
 void Hdf5File::fail(std::string_view what, std::string_view path) const {
