@@ -5,14 +5,10 @@
 
 #include <cerrno>
 #include <stdexcept>
-#include <system_error>
 
 namespace femxdem {
-namespace {
 
 std::system_error system_error(const char* what) { return {errno, std::generic_category(), what}; }
-
-}  // namespace
 
 std::int64_t put_mail(int descriptor, std::string_view bytes) {
   if (ftruncate(descriptor, 0) != 0 || ftruncate(descriptor, static_cast<off_t>(bytes.size())) != 0)

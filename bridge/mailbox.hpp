@@ -3,8 +3,12 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace femxdem {
+
+/// What the system says now (errno), of `what`.
+std::system_error system_error(const char* what);
 
 /// Puts bytes into the anonymous file behind `descriptor` (replacing what was there) and returns their number.
 /// Throws std::system_error.

@@ -29,8 +29,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::system_error system_error(const char* what) { return {errno, std::generic_category(), what}; }
-
 /// Environment of the worker: one thread, nothing of our MPI, nothing that moves Python's own folders. CHOLMOD asks
 /// OpenMP for four threads whatever OMP_NUM_THREADS says, and a trial, being a fork, waits for ever for those of its
 /// parent: the limit leaves none.

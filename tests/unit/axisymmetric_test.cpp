@@ -246,7 +246,7 @@ TEST(AxisymmetricCase, PressedCylinderGivesItsForceWithEveryOperator) {
   }
 }
 
-std::string mistakes_of(const std::string& text, const std::vector<std::string>& overrides) {
+std::string mistakes_in(const std::string& text, const std::vector<std::string>& overrides) {
   try {
     read_case(file_of(text), overrides);
     return "";
@@ -256,9 +256,9 @@ std::string mistakes_of(const std::string& text, const std::vector<std::string>&
 }
 
 TEST(AxisymmetricCase, WhatItDoesNotKnowIsRefused) {
-  EXPECT_EQ(mistakes_of(kCylinder, {}), "") << "the hoops hold the body along x: only the axis must be";
+  EXPECT_EQ(mistakes_in(kCylinder, {}), "") << "the hoops hold the body along x: only the axis must be";
   const auto refused = [](const std::vector<std::string>& overrides, const char* sentence) {
-    const std::string said = mistakes_of(kCylinder, overrides);
+    const std::string said = mistakes_in(kCylinder, overrides);
     EXPECT_NE(said.find(sentence), std::string::npos) << said;
   };
   refused({"element.D=10"}, "element.D is of no use with element.type = \"axisymmetric\"; remove it");
@@ -271,7 +271,7 @@ TEST(AxisymmetricCase, AMeshAcrossTheAxisIsRefused) {
   std::string text = kCylinder;
   text.replace(0, text.find("[element]"),
                "[mesh]\ntype = \"annulus\"\ninner_radius = 1\nouter_radius = 2\nangle = 180\nnr = 1\nnt = 2\n");
-  const std::string said = mistakes_of(text, {"load.0.edge=start", "load.1.edge=end", "load.2.edge=inner",
+  const std::string said = mistakes_in(text, {"load.0.edge=start", "load.1.edge=end", "load.2.edge=inner",
                                               "monitor.0.edge=start", "monitor.1.edge=end"});
   EXPECT_NE(said.find("lies on the left of the axis x = 0 of axisymmetric elements; move the mesh to x >= 0"),
             std::string::npos)

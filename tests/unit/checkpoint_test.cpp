@@ -7,10 +7,10 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "errors.hpp"
 #include "hdf5_file.hpp"
+#include "output_folder.hpp"
 #include "own_folder.hpp"
 #include "sealed_file.hpp"
 
@@ -79,12 +79,6 @@ class CheckpointTest : public OwnFolder {
   }
   fs::path file() const { return folder_ / "checkpoint.h5"; }
 };
-
-std::string bytes_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 void put_bytes(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
 
@@ -158,7 +152,7 @@ TEST_F(CheckpointTest, AMissingOrForeignFileIsRefused) {
 TEST_F(CheckpointTest, EveryDamageIsSeenAndTheOneBeforeIsOffered) {
   write(17);
   write(18);
-  const std::string whole = bytes_of(file()), name = file().string(), before = folder_ / "checkpoint.previous.h5";
+  const std::string whole = read_file(file()), name = file().string(), before = folder_ / "checkpoint.previous.h5";
   const std::string offer = fmt::format(
       "; the one before it, after step 17, is whole: `mv {} {}`, then --restart goes on from there", before, name);
   for (std::size_t byte = 0; byte < whole.size(); byte += 101) {

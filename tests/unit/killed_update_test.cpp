@@ -7,9 +7,9 @@
 #include <fstream>
 #include <iostream>
 #include <numeric>
-#include <sstream>
 
 #include "hdf5_file.hpp"
+#include "output_folder.hpp"
 #include "own_folder.hpp"
 #include "undo_driver.hpp"
 
@@ -59,12 +59,6 @@ void go_back(const fs::path& file) {
   h5.finish();
 }
 
-std::string bytes_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
 class KilledUpdate : public OwnFolder {
  protected:
   KilledUpdate() {
@@ -97,16 +91,16 @@ class KilledUpdate : public OwnFolder {
   /// Kills the update at each of its writes: undone, the file has the bytes of before. Returns the number of writes.
   template <class Update>
   int kill_at_each_write(bool half, Update update) const {
-    const std::string before = bytes_of(file_);
+    const std::string before = read_file(file_);
     int writes = 0, torn = 0;
     for (; killed(writes, half, update); ++writes) {
-      torn += bytes_of(file_).substr(0, before.size()) != before;
+      torn += read_file(file_).substr(0, before.size()) != before;
       undo_unfinished_update(file_);
-      EXPECT_TRUE(bytes_of(file_) == before) << "killed at write " << writes;
+      EXPECT_TRUE(read_file(file_) == before) << "killed at write " << writes;
     }
     EXPECT_GT(torn, 0) << "no write overwrites anything: nothing is tested";
     EXPECT_FALSE(fs::exists(undo_file(file_)));
-    EXPECT_FALSE(bytes_of(file_) == before);
+    EXPECT_FALSE(read_file(file_) == before);
     return writes;
   }
 
@@ -114,12 +108,12 @@ class KilledUpdate : public OwnFolder {
 };
 
 TEST_F(KilledUpdate, OneThatIsGivenUpIsUndoneAtOnce) {
-  const std::string before = bytes_of(file_);
+  const std::string before = read_file(file_);
   {
     Hdf5File file(file_, Mode::update);
     file.write("/given_up", std::vector<double>(1000, 1.0), {1000});
   }
-  EXPECT_EQ(bytes_of(file_), before);
+  EXPECT_EQ(read_file(file_), before);
   EXPECT_FALSE(fs::exists(undo_file(file_)));
 }
 
@@ -142,11 +136,11 @@ TEST_F(KilledUpdate, OfAFileThatBecomesShorterIsUndone) {
 }
 
 TEST_F(KilledUpdate, IsUndoneByTheNextUpdateAlsoWhereThatIsKilledWhileItUndoes) {
-  const std::string before = bytes_of(file_);
+  const std::string before = read_file(file_);
   ASSERT_TRUE(killed(3, false, [&] { write_step(file_, kSteps); }));
   for (int writes = 0; killed(writes, false, [&] { undo_unfinished_update(file_); }); ++writes)
     ASSERT_TRUE(fs::exists(undo_file(file_)));
-  EXPECT_TRUE(bytes_of(file_) == before);
+  EXPECT_TRUE(read_file(file_) == before);
   ASSERT_TRUE(killed(3, false, [&] { write_step(file_, kSteps); }));
   write_step(file_, kSteps + 1);
   EXPECT_EQ(Hdf5File(file_, Mode::read).read(group(kSteps + 1) + "/u").at(7), kSteps + 8);

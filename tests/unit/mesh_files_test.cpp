@@ -8,10 +8,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "edge_length.hpp"
 #include "errors.hpp"
 #include "mesh.hpp"
 #include "mesh_gaps.hpp"
+#include "mesh_measures.hpp"
 #include "msh2_file.hpp"
 #include "reference_element.hpp"
 
@@ -19,19 +19,6 @@ namespace femxdem {
 namespace {
 
 std::string data(const std::string& name) { return fmt::format("{}/mesh/{}", TEST_CASES, name); }
-
-double area(const Mesh& mesh) {
-  double sum = 0.0;
-  for (const auto& e : mesh.elements) {
-    for (const auto& q : gauss_2x2()) {
-      Eigen::Matrix2d J = Eigen::Matrix2d::Zero();
-      const Gradient8 gradient = shape_gradient_q8(q.xi, q.eta);
-      for (int a = 0; a < 8; ++a) J += mesh.nodes[e[a]] * gradient.row(a);
-      sum += q.weight * J.determinant();
-    }
-  }
-  return sum;
-}
 
 std::string refusal(const std::string& file) {
   try {
@@ -104,7 +91,8 @@ TEST(MeshFiles, EmptyOrNamelessGroupsAreRefused) {
   EXPECT_EQ(gmsh_mesh(data("without_names.geo")).edges.size(), 0u);
 }
 
-/// In processes of their own: Gmsh's parser does not forget a text that it could not end. _Exit: its leaks are not ours.
+/// In processes of their own: Gmsh's parser does not forget a text that it could not end. _Exit: its leaks are not
+/// ours.
 TEST(MeshFiles, ErrorsInAGeometryAreRefused) {
   for (const char* wrong :
        {"Plane Surface(1) = {9};", "nonsense(1) = {1};", "Plane Surface(1) = {1}; BooleanFragments{ Surface{1};",

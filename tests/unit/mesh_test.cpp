@@ -8,29 +8,14 @@
 #include <numbers>
 #include <set>
 
-#include "edge_length.hpp"
 #include "errors.hpp"
+#include "mesh_measures.hpp"
 #include "reference_element.hpp"
 
 namespace femxdem {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-double jacobian(const Mesh& mesh, int element, double xi, double eta) {
-  Eigen::Matrix2d J = Eigen::Matrix2d::Zero();
-  const Gradient8 gradient = shape_gradient_q8(xi, eta);
-  for (int a = 0; a < 8; ++a) J += mesh.nodes[mesh.elements[element][a]] * gradient.row(a);
-  return J.determinant();
-}
-
-double area(const Mesh& mesh) {
-  double sum = 0.0;
-  for (int e = 0; e < static_cast<int>(mesh.elements.size()); ++e) {
-    for (const auto& q : gauss_2x2()) sum += q.weight * jacobian(mesh, e, q.xi, q.eta);
-  }
-  return sum;
-}
 
 /// Sides of an edge chain up, are sides of their elements, and have the material on the left.
 void expect_oriented_chain(const Mesh& mesh, const std::string& name) {
@@ -166,10 +151,10 @@ TEST(CheckMesh, NamesTheFoldedElement) {
   }
 }
 
-std::string data(const std::string& name) { return std::string(TEST_CASES) + "/" + name; }
+std::string case_file(const std::string& name) { return std::string(TEST_CASES) + "/" + name; }
 
 TEST(GmshMesh, GeometryIsMeshedWithItsNames) {
-  const Mesh mesh = gmsh_mesh(data("square.geo"));
+  const Mesh mesh = gmsh_mesh(case_file("square.geo"));
   EXPECT_EQ(mesh.elements.size(), 4u);
   EXPECT_EQ(mesh.nodes.size(), 21u);
   EXPECT_NEAR(area(mesh), 1.0, 1e-14);
@@ -238,15 +223,16 @@ TEST(GmshMesh, WrongFilesAreRefusedWithTheReason) {
       return std::string(error.what());
     }
   };
-  EXPECT_NE(sentence(data("triangles.geo")).find("14 elements of type 'Triangle 6', but only 8-node quadrilaterals"),
-            std::string::npos);
+  EXPECT_NE(
+      sentence(case_file("triangles.geo")).find("14 elements of type 'Triangle 6', but only 8-node quadrilaterals"),
+      std::string::npos);
   EXPECT_EQ(sentence("nowhere.msh"), "nowhere.msh: no such file; give a Gmsh mesh");
-  EXPECT_NE(sentence(data("good.toml")).find("not a Gmsh file by its name"), std::string::npos);
+  EXPECT_NE(sentence(case_file("good.toml")).find("not a Gmsh file by its name"), std::string::npos);
   const std::string garbage = (std::filesystem::path(testing::TempDir()) / "garbage.msh").string();
   std::ofstream(garbage) << "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\nnone\n";
   EXPECT_NE(sentence(garbage).find("Gmsh cannot read it (Could not read nodes)"), std::string::npos);
   const std::string crashes = (std::filesystem::path(testing::TempDir()) / "crashes.geo").string();
-  std::ofstream(crashes) << "Mesh.Algorithm = 8;\nMerge \"" << data("square.geo") << "\";\n";
+  std::ofstream(crashes) << "Mesh.Algorithm = 8;\nMerge \"" << case_file("square.geo") << "\";\n";
   EXPECT_NE(sentence(crashes).find("Mesh.Algorithm = 8 is not safe"), std::string::npos);
 }
 

@@ -269,7 +269,7 @@ TEST(Summary, UnknownRatiosAreNull) {
   EXPECT_NE(json.find("\"parallel_efficiency\": null"), std::string::npos);
 }
 
-Tensor2 rotation(double angle) {
+Tensor2 oblique_rotation(double angle) {
   return Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
 }
 
@@ -284,7 +284,7 @@ TEST(PointFields, StrainInvariantsOfStretchesAndRotations) {
   const double a = 0.2;
   const Tensor2 isochoric = Eigen::Vector3d(std::exp(a), std::exp(-a), 1).asDiagonal();
   const Tensor2 uniaxial = Eigen::Vector3d(std::exp(-a), 1, 1).asDiagonal();
-  const std::vector<Tensor2> F = {isochoric, rotation(1.1) * isochoric, uniaxial, rotation(0.7)};
+  const std::vector<Tensor2> F = {isochoric, oblique_rotation(1.1) * isochoric, uniaxial, oblique_rotation(0.7)};
   const std::vector<Tensor2> stress(4, Tensor2::Identity());
   const auto fields = point_fields(F, stress, std::vector<PointReport>(4));
   const std::vector<double>& shear = values(fields, "strain_invariant");
@@ -298,10 +298,10 @@ TEST(PointFields, StrainInvariantsOfStretchesAndRotations) {
 }
 
 TEST(PointFields, LogarithmicStrainFollowsTheStretch) {
-  const Tensor2 Q = rotation(0.4);
+  const Tensor2 Q = oblique_rotation(0.4);
   const Tensor2 E = Q * Eigen::Vector3d(0.1, -0.3, 0.05).asDiagonal() * Q.transpose();
   const Tensor2 U = Q * Eigen::Vector3d(std::exp(0.1), std::exp(-0.3), std::exp(0.05)).asDiagonal() * Q.transpose();
-  EXPECT_LT((logarithmic_strain(rotation(2.0) * U) - E).norm(), 1e-15);
+  EXPECT_LT((logarithmic_strain(oblique_rotation(2.0) * U) - E).norm(), 1e-15);
 }
 
 TEST(PointFields, StressInvariantsAndRowMajorTensors) {
@@ -325,7 +325,7 @@ TEST(PointFields, SecondOrderWorkOfALinearNominalStress) {
   };
   Tensor2 F0 = Tensor2::Identity();
   F0(0, 1) = 0.3;
-  Tensor2 F1 = rotation(0.2) * F0;
+  Tensor2 F1 = oblique_rotation(0.2) * F0;
   F1(2, 2) += 0.1;
   const auto work =
       second_order_work(std::vector{F0}, std::vector{cauchy(F0)}, std::vector{F1}, std::vector{cauchy(F1)});
