@@ -31,8 +31,8 @@ def folder(room):
 
 def command_of(room):
     """Folder and words of the compiler's command of a file of the room, without its input and output."""
-    of_bridge = [c for c in COMMANDS if Path(c["file"]).name == "straining.cpp"]
-    entry = (of_bridge if room == "bridge" else [c for c in COMMANDS if Path(c["file"]).parent == folder(room)])[0]
+    target = {"bridge": "bridge", "program": "femxdem_program"}.get(room, f"fe_{room}")
+    entry = next(c for c in COMMANDS if f"/{target}.dir/" in c["command"] and ".gch" not in c["command"])
     words = shlex.split(entry["command"])
     words = words[1:] if Path(words[0]).name == "ccache" else words
     at = words.index("-o")
