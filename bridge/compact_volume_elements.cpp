@@ -295,7 +295,7 @@ void CompactVolumeElements::commit() {
   begin_step();
 }
 
-std::vector<PointReport> CompactVolumeElements::reports() const {
+std::vector<PointReport> CompactVolumeElements::reports() {
   std::vector<PointReport> reports;
   for (const Point& point : points_) reports.push_back(point.report);
   return reports;

@@ -40,7 +40,7 @@ class CompactVolumeElements : public LocalPoints {
   /// Throws EngineDiffers.
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
-  std::vector<PointReport> reports() const override;
+  std::vector<PointReport> reports() override;
   void save_each(const TakeState& take) override;
   std::string save_one(std::size_t index) override;
   void load_into(std::span<const std::size_t> points, const std::string& state) override;

@@ -41,7 +41,7 @@ class Engine {
   void deform(int ve, Slot& slot);
   /// Stress, stretch and what judges a trial of the report into the slot.
   void measure(int ve, Slot& slot);
-  /// The rest of the report that measure has begun.
+  /// What measure has left NaN of the report.
   void complete_report(int ve, Slot& slot);
   void stiffness(int ve, Slot& slot, VeStiffness kind);
   void follow_network(int ve);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <csignal>
 #include <limits>
 #include <stdexcept>
@@ -53,7 +54,11 @@ void PythonVolumeElements::add(const std::string& state, std::size_t count) {
   point.reference_time_scale = saved ? saved->reference_time_scale : added.time_scale;
   point.origin = saved ? saved->origin : hash(state);
   points_.resize(first + count, point);
-  for (std::size_t i = first; i < size(); ++i) adopt_state(i);
+  reports_.resize(first + count);
+  for (std::size_t i = first; i < size(); ++i) {
+    adopt_state(i);
+    keep_report(i);
+  }
   peak_memory_ = std::max(peak_memory_, worker_.memory());
 }
 
@@ -61,6 +66,7 @@ void PythonVolumeElements::remove(std::size_t index) {
   drop_trial();
   worker_.request(Command::remove, static_cast<std::int64_t>(index));
   points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(index));
+  reports_.erase(reports_.begin() + static_cast<std::ptrdiff_t>(index));
 }
 
 void PythonVolumeElements::begin_step() {
@@ -178,7 +184,10 @@ void PythonVolumeElements::commit() {
   }
   worker_.adopt(static_cast<pid_t>(reply.value));
   trial_pending_ = false;
-  for (std::size_t i = 0; i < size(); ++i) adopt_state(i);
+  for (std::size_t i = 0; i < size(); ++i) {
+    adopt_state(i);
+    keep_report(i);
+  }
   begin_step();
 }
 
@@ -189,10 +198,17 @@ std::string PythonVolumeElements::save_one(std::size_t index) {
   return encode({EngineKind::yade, points_[index].reference_time_scale, points_[index].origin, std::move(bytes)});
 }
 
-std::vector<PointReport> PythonVolumeElements::reports() const {
-  std::vector<PointReport> reports(size());
-  for (std::size_t i = 0; i < size(); ++i) reports[i].values = worker_.slot(i).report;
-  return reports;
+std::vector<PointReport> PythonVolumeElements::reports() {
+  if (size() == 0) return {};
+  drop_trial();
+  worker_.request(Command::report);
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto& found = worker_.slot(i).report;
+    auto& values = reports_[i].values;
+    for (std::size_t k = 0; k < values.size(); ++k)
+      if (std::isnan(values[k])) values[k] = found[k];
+  }
+  return reports_;
 }
 
 void PythonVolumeElements::save_each(const TakeState& take) {
@@ -213,6 +229,7 @@ void PythonVolumeElements::load_into(std::span<const std::size_t> points, const 
                     compact ? CompactCell::load(saved.bytes).to_scene() : saved.bytes);
     points_[i].reference_time_scale = saved.reference_time_scale;
     adopt_state(i);
+    keep_report(i);
   }
   begin_step();
 }
@@ -230,6 +247,11 @@ NetworkLevel PythonVolumeElements::level(std::size_t index) {
 void PythonVolumeElements::adopt_state(std::size_t index) {
   points_[index].stretch = tensor(worker_.slot(index).stretch);
   points_[index].level = level(index);
+}
+
+void PythonVolumeElements::keep_report(std::size_t index) {
+  const auto& found = worker_.slot(index).report;
+  std::copy(found.begin(), found.end(), reports_[index].values.begin());
 }
 
 }  // namespace femxdem

@@ -45,7 +45,7 @@ class PythonVolumeElements : public LocalPoints {
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   /// Throws std::logic_error without a trial or after a trial that failed.
   void commit() override;
-  std::vector<PointReport> reports() const override;
+  std::vector<PointReport> reports() override;
   void save_each(const TakeState& take) override;
   void load_into(std::span<const std::size_t> points, const std::string& state) override;
 
@@ -59,10 +59,12 @@ class PythonVolumeElements : public LocalPoints {
   void drop_trial();
   NetworkLevel level(std::size_t index);  ///< of what stands in its slot
   void adopt_state(std::size_t index);
+  void keep_report(std::size_t index);
 
   WorkerProcess& worker_;
   VolumeElementOptions options_;
   std::vector<StrainedPoint> points_;
+  std::vector<PointReport> reports_;  ///< of the trials that were committed; a later one overwrites its slot
   std::uint64_t peak_memory_ = 0;
   double seconds_per_step_ = 0;  ///< most that a DEM step has taken so far [s]
   bool trial_pending_ = false;

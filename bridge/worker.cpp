@@ -71,6 +71,7 @@ void Worker::answer(const Message& message) {
       {Command::remove, &Worker::remove},
       {Command::evaluate, &Worker::evaluate},
       {Command::commit, &Worker::commit_in_process},
+      {Command::report, &Worker::complete_reports},
       {Command::save, &Worker::save},
       {Command::load, &Worker::load},
       {Command::export_scene, &Worker::export_scene},
@@ -159,7 +160,6 @@ void Worker::restore(std::size_t index, const std::string& state) {
 void Worker::refresh(std::size_t index) {
   Slot& slot = batch_.slots[index];
   engine_.measure(ves_[index], slot);
-  engine_.complete_report(ves_[index], slot);
   slot.info = engine_.info(ves_[index]);
 }
 
@@ -224,7 +224,6 @@ void Worker::serve_trial(const Message& message, pid_t committed) {
 }
 
 void Worker::adopt_trial(const Message& message, pid_t committed) {
-  complete_reports();
   follow_networks();
   prctl(PR_SET_PDEATHSIG, 0);
   kill(committed, SIGKILL);  // from here on this is the committed state
@@ -239,7 +238,6 @@ void Worker::commit_in_process(const Message& message) {
   if (!trial_in_process_) throw std::runtime_error("there is no trial to commit");
   trial_in_process_ = false;
   forget_states();
-  complete_reports();
   follow_networks();
   reply(message, ReplyKind::done, getpid());
 }
@@ -263,8 +261,9 @@ void Worker::take_snapshot() {
   restored_.clear();
 }
 
-void Worker::complete_reports() noexcept {
+void Worker::complete_reports(const Message& message) {
   for (std::size_t i = 0; i < ves_.size(); ++i) engine_.complete_report(ves_[i], batch_.slots[i]);
+  reply(message, ReplyKind::done);
 }
 
 void Worker::follow_networks() noexcept {

@@ -31,6 +31,7 @@ class Worker {
   void add(const Message& message);
   void make_template(const Message& message);
   void evaluate(const Message& message);
+  void complete_reports(const Message& message);
   void save(const Message& message);
   void load(const Message& message);
   void remove(const Message& message);
@@ -49,9 +50,7 @@ class Worker {
   void deform_one(std::size_t index, std::int64_t stiffness);
   void take_snapshot();
   void restore(std::size_t index, const std::string& state);
-  /// An engine that fails in one of these two ends the process: the rank repeats the trial once, from the committed
-  /// state.
-  void complete_reports() noexcept;
+  /// An engine that fails here ends the process: the rank repeats the trial once, from the committed state.
   void follow_networks() noexcept;
   void refresh(std::size_t index);
 

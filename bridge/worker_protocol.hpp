@@ -27,6 +27,7 @@ enum class Command : std::uint32_t {
   remove,         ///< a: index; those behind move up by one
   evaluate,       ///< a: kNoStiffness or VeStiffness; b: 1 fork, 0 serialise; reply value: 1 if the trial was forked
   commit,         ///< the trial becomes the committed state; reply value: process id of the committed process
+  report,         ///< completes the reports of the committed states
   reject,         ///< the trial is given up; no reply
   save,           ///< a: index; mail out: state, from which the volume element goes on
   load,           ///< a: index; mail in: state

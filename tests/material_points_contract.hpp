@@ -95,10 +95,13 @@ inline void check_continuation(MaterialPoints& points, const Tolerances& toleran
 }
 
 inline void check_reports(MaterialPoints& points, const Tolerances& tolerances) {
-  SCOPED_TRACE("reports are complete once they are committed");
-  auto responses = trial(points, part(gradients(points.size(), tolerances.strain), 0.5));
+  SCOPED_TRACE("reports of what was committed are whole where they are asked for, also after a trial that is rejected");
+  const auto F = gradients(points.size(), tolerances.strain);
+  auto responses = trial(points, part(F, 0.5));
   const auto of_trial = responses;
-  commit(points, responses);
+  points.commit();
+  trial(points, F);
+  complete_reports(points, responses);
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t k = 0; k < kReportFields.size(); ++k) {
       const double before = of_trial[i].report.values[k], after = responses[i].report.values[k];

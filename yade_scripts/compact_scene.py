@@ -149,7 +149,7 @@ def cell(O):
 
 
 def stress(O):
-    """(3, 3) Cauchy stress [Pa] of a covered scene, symmetric, with the bits of compact cells (love_weber of
+    """(3, 3) Cauchy stress [Pa] of a covered scene, slightly asymmetric, with the bits of compact cells (love_weber of
     bridge/compact_report.cpp): the same operations, contacts in the order of the spheres' numbers."""
     contacts = sorted(O.interactions, key=attrgetter("id1", "id2"))
     phys, x = [i.phys for i in contacts], _vectors([b.state for b in O.bodies], "pos")
@@ -160,7 +160,7 @@ def stress(O):
     s = np.zeros((3, 3))
     if contacts:  # cumsum adds one after the other
         s = np.cumsum(force[:, :, None] * branch[:, None, :], axis=0)[-1] / O.cell.volume
-    return 0.5 * (s + s.T)
+    return s
 
 
 def _numbers(O, law, safety):

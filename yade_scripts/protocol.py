@@ -27,9 +27,8 @@ Errors are exceptions whose text is one clear sentence (what, where, what to do)
     measure(ve, out_stress, out_report, out_stretch)   (9,) Cauchy stress [Pa], symmetrised; report: what judges and
                                        counts a trial, NaN where it costs more; (9,) the cell's deformation gradient
                                        from the reference (adopted) state
-    complete_report(ve, out_report)    the entries of the report that measure has left NaN, of the same moment; called
-                                       for states that are committed. sliding_contacts and adhesive_contacts may be as
-                                       old as 200 DEM steps, the rest is of now
+    complete_report(ve, out_report)    the entries of the report that measure has left NaN, of now; called for committed
+                                       states, where a field is written
     follow_network(ve)                 the time step of info() becomes what the state of now asks for; called between
                                        load steps, never within one
     stiffness(ve, out_stiffness, kind)  (81,) Eq. (2) of Nguyen et al. (2017) with both tangents, minor-symmetrised

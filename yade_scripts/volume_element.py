@@ -29,7 +29,6 @@ from time_step import follow_network, set_time_step
 
 DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "scene_sha256": ""}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
-LOOK_EVERY = 200  # DEM steps between two looks at every contact's forces, which cost as much as 10 to 30 steps
 
 
 @dataclass
@@ -40,9 +39,6 @@ class _Trial:
     engine_seconds: float = 0.0
     seconds: float = 0.0
     rate: float = 0.0  # norm of the strain rate [1/s]
-    since_look: int = LOOK_EVERY  # DEM steps
-    sliding: float = 0.0  # at the last look
-    adhesive: float = 0.0
 
 
 @dataclass
@@ -249,7 +245,6 @@ class Engine:
         trial = self._trial[ve]
         trial.steps, trial.engine_seconds, trial.seconds = steps, now - before, now - started
         trial.rate = float(np.linalg.norm(L + L.T)) / 2
-        trial.since_look += steps
 
     def _run_sampled(self, steps, every, late, out_mean, new_adhesion):
         mean, made = mean_stress.MeanStress(steps, late), 0
@@ -285,14 +280,12 @@ class Engine:
 
     def complete_report(self, ve, out_report):
         self._select(ve)
-        trial, grains = self._trial[ve], self._grains[ve]
+        grains = self._grains[ve]
         values = self._contact_network()
         for name, f in zip(("xx", "yy", "zz", "xy", "yz", "zx"), values.pop("fabric")):
             values["fabric_" + name] = f
         values["mean_rotation"] = _mean_rotation(grains.states)
-        if trial.since_look >= LOOK_EVERY:
-            trial.since_look, (trial.sliding, trial.adhesive) = 0, self._contact_states(grains)
-        values["sliding_contacts"], values["adhesive_contacts"] = trial.sliding, trial.adhesive
+        values["sliding_contacts"], values["adhesive_contacts"] = self._contact_states(grains)
         self._fill(out_report, values)
 
     def _fill(self, out_report, values):

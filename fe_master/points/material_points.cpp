@@ -49,8 +49,7 @@ void require_states_of(std::size_t points, const StateSource& states) {
                     std::to_string(points) + "; restart with the case it was written by");
 }
 
-void commit(MaterialPoints& points, std::span<Response> responses) {
-  points.commit();
+void complete_reports(MaterialPoints& points, std::span<Response> responses) {
   const std::vector<PointReport> reports = points.reports();
   for (std::size_t i = 0; i < reports.size(); ++i) responses[i].report = reports[i];
 }

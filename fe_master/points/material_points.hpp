@@ -118,9 +118,9 @@ class MaterialPoints {
   virtual std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) = 0;
   /// Adopt the last trial as the committed state.
   virtual void commit() = 0;
-  /// After a commit: the complete reports of the committed state; none where Response::report was complete already. A
-  /// trial of volume elements leaves NaN in what does not judge or count it, see complete_report of protocol.py.
-  virtual std::vector<PointReport> reports() const { return {}; }
+  /// The whole reports of the committed states; none where Response::report is whole. A trial of volume elements leaves
+  /// NaN in what neither judges nor counts it, see complete_report of protocol.py. Gives up a trial that is pending.
+  virtual std::vector<PointReport> reports() { return {}; }
   /// Hands over the committed states, one after another, of every point once; equal ones perhaps several times. The
   /// points themselves go on from exactly what was saved (bit-equal restart).
   virtual void save_each(const TakeState& take) = 0;
@@ -162,7 +162,7 @@ class LocalPoints : public MaterialPoints {
 /// Throws UserError where `states` are of another number of points.
 void require_states_of(std::size_t points, const StateSource& states);
 
-/// Commits the last trial and completes the reports of its responses.
-void commit(MaterialPoints& points, std::span<Response> responses);
+/// Gives the responses of the committed trial their whole reports.
+void complete_reports(MaterialPoints& points, std::span<Response> responses);
 
 }  // namespace femxdem

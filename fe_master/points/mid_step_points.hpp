@@ -34,7 +34,7 @@ class MidStepPoints : public MaterialPoints {
   void begin_step() override { points_.begin_step(); }
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { points_.commit(); }
-  std::vector<PointReport> reports() const override { return points_.reports(); }
+  std::vector<PointReport> reports() override { return points_.reports(); }
   void save_each(const TakeState& take) override { points_.save_each(take); }
   void load_each(const StateSource& states) override { points_.load_each(states); }
 

@@ -134,8 +134,7 @@ std::string evaluate(LocalPoints& local, PacketReader input) {
 }
 
 /// Output: the number of reports, 0 or one for each local point, and the reports.
-std::string commit(LocalPoints& local) {
-  local.commit();
+std::string report(LocalPoints& local) {
   const std::vector<PointReport> reports = local.reports();
   PacketWriter output;
   output.put(reports.size());
@@ -189,7 +188,10 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
     case Order::evaluate:
       return evaluate(local, PacketReader(input));
     case Order::commit:
-      return commit(local);
+      local.commit();
+      break;
+    case Order::report:
+      return report(local);
     case Order::save:
       hand_over(communicator, local);
       break;

@@ -116,16 +116,21 @@ void VolumeElements::count(const std::vector<Response>& responses, double second
 }
 
 void VolumeElements::commit() {
-  const std::vector<std::string> answers = command(communicator_, Order::commit, {}, local_);
-  reports_.clear();
+  command(communicator_, Order::commit, {}, local_);
+  histories_.commit();
+}
+
+std::vector<PointReport> VolumeElements::reports() {
+  const std::vector<std::string> answers = command(communicator_, Order::report, {}, local_);
+  std::vector<PointReport> reports;
   for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
     PacketReader packet(answers[rank]);
     if (packet.get<std::size_t>() == 0) continue;
-    reports_.resize(size());
+    reports.resize(size());
     for (const std::size_t point : shares_[rank])
-      packet.get_doubles(reports_[point].values.data(), reports_[point].values.size());
+      packet.get_doubles(reports[point].values.data(), reports[point].values.size());
   }
-  histories_.commit();
+  return reports;
 }
 
 /// Rank 0 takes one state of each rank after each of its own: all work on their next one meanwhile. Who fails, a rank

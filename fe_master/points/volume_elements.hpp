@@ -66,7 +66,7 @@ class VolumeElements : public MaterialPoints {
   void begin_step() override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
-  std::vector<PointReport> reports() const override { return reports_; }
+  std::vector<PointReport> reports() override;
   /// Ranks hand over one state after another, rank 0 holds one of each.
   void save_each(const TakeState& take) override;
   void load_each(const StateSource& states) override;
@@ -94,7 +94,6 @@ class VolumeElements : public MaterialPoints {
   LocalPoints& local_;
   std::vector<std::vector<std::size_t>> shares_;  ///< points of each rank, in its order
   std::vector<double> latest_, older_;            ///< costs of each point since the last balance(), and before
-  std::vector<PointReport> reports_;              ///< of the last commit
   EqualHistories histories_;
   std::size_t distinct_ = 0;
   FarmStatistics statistics_, at_last_balance_;

@@ -61,7 +61,8 @@ std::string Service::evaluate(const Tensor2& F, Operator wanted) {
 }
 
 std::string Service::commit() {
-  femxdem::commit(point_, {&last_, 1});
+  point_.commit();
+  complete_reports(point_, {&last_, 1});
   point_.begin_step();
   return "done" + numbers(last_.report.values);
 }

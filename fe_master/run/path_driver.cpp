@@ -63,7 +63,8 @@ PathDriver::PathDriver(MaterialPoints& point, const SolverParameters& parameters
     : point_(point, parameters.answer_at), parameters_(parameters) {
   assert(point.size() == 1 && is_given(parameters.tolerance) && is_given(parameters.displacement_tolerance));
   begin_segment({});
-  femxdem::commit(point_, {&response_, 1});
+  point_.commit();
+  complete_reports(point_, {&response_, 1});
 }
 
 void PathDriver::begin_segment(const PathSegment& segment) {
@@ -233,7 +234,8 @@ double PathDriver::noise(double amplitude, int samples) {
 }
 
 void PathDriver::commit() {
-  femxdem::commit(point_, {&trial_, 1});
+  point_.commit();
+  complete_reports(point_, {&trial_, 1});
   last_E_change_ = path_strain(trial_F_) - path_strain(F_);
   last_fraction_ = trial_fraction_ - fraction_;
   fraction_ = trial_fraction_;

@@ -238,6 +238,7 @@ std::string TimeLoop::place(std::size_t point) const {
 }
 
 void TimeLoop::write_fields() {
+  solver_.complete_reports();
   results_.write(field_step(files_.summary.steps, case_.control.end_time, problem_, before_));
 }
 

@@ -82,7 +82,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       reuse_(parameters.reuse_below, points.size()),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
   assert(parameters.reuse_below == 0 || parameters.answer_at == 1);
-  femxdem::commit(points_, committed_.responses);
+  points_.commit();
   committed_.internal = assembler_.force(committed_.configuration(), stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
 }
@@ -370,7 +370,7 @@ void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistor
 }
 
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
-  femxdem::commit(points_, trial.responses);
+  points_.commit();
   reuse_.commit();
   last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
            trial.external - committed_.external, trial.load_factor - committed_.load_factor};
@@ -381,6 +381,8 @@ void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   formulation_.commit(start_);
   committed_.x += start_ - end;  // unknowns that are increments of a step are counted from the new start
 }
+
+void NonlinearSolver::complete_reports() { femxdem::complete_reports(points_, committed_.responses); }
 
 void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);

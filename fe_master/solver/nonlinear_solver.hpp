@@ -88,6 +88,8 @@ class NonlinearSolver {
 
   /// The last equilibrium found, at theta of the last step: that which curves and fields show.
   const Equilibrium& committed() const { return committed_; }
+  /// Gives the committed responses their whole reports, which cost volume elements as much as a trial.
+  void complete_reports();
   /// The end of the last step [s]: committed().time for theta = 1.
   double time() const { return time_; }
   /// From the committed equilibrium to that of a step dt [s]: dt for theta = 1.

@@ -140,7 +140,8 @@ TEST(PythonVolumeElements, ReportsAreCompleteOnceTheyAreCommitted) {
       std::vector<Response> responses = three.points.evaluate(all, Operator::none);
       const std::vector<Response> trial = responses;
       for (const Response& r : trial) EXPECT_TRUE(std::isnan(r.report["mean_rotation"]));
-      commit(three.points, responses);
+      three.points.commit();
+      complete_reports(three.points, responses);
       for (std::size_t i = 0; i < 3; ++i) {
         PointReport report = trial[i].report;
         report["mean_rotation"] = responses[i].report["mean_rotation"];
