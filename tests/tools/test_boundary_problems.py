@@ -39,6 +39,10 @@ class Files(unittest.TestCase):
         self.assertEqual((paid.steps, paid.evaluations, paid.most, paid.dem_steps), (2, 7, 5, 350))
         self.assertEqual((paid.wall, paid.core_hours, paid.rejected, paid.engine), (3600.0, 2.0, 1, "compact"))
 
+    def test_the_wall_time_of_a_run_that_was_gone_on_with_is_that_of_all_its_sittings(self):
+        self.assertEqual(problems.wall_seconds(np.array([10.0, 766.0, 48.0, 684.0])), 1450.0)
+        self.assertEqual(problems.wall_seconds(np.array([10.0, 20.0])), 20.0)
+
     def test_strength_of_a_material_in_closed_form(self):
         phi, c, psi = np.radians(30), 0.2e5, np.radians(10)
         def element(sigma3):

@@ -93,10 +93,16 @@ def cost(run):
     h = run.history()
     file = run.folder / "summary.json"
     summary = json.loads(file.read_text()) if file.exists() else {}
-    wall = float(h["wall_s"][-1]) if "wall_s" in h else summary.get("wall_seconds", 0.0)
+    wall = wall_seconds(h["wall_s"]) if "wall_s" in h else summary.get("wall_seconds", 0.0)
     cores = summary.get("ranks", 1) * summary.get("threads", os.cpu_count())
     return Cost(len(h["step"]), int(sum(h["evaluations"])), len(run.rejections()), float(sum(h["dem_steps"])), wall,
                 wall * cores / 3600, int(max(h["evaluations"])), summary.get("engine", "?"))
+
+
+def wall_seconds(column):
+    """Of all sittings of a run: each counts from 0 again."""
+    ends = np.append(column[1:] < column[:-1], True)
+    return float(column[ends].sum())
 
 
 def how_it_ended(run):
