@@ -19,8 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const fs::path& file, int reason) {
-  if (reason == ENOENT)  // what is written exists, or its folder does
-    throw DiskError(fmt::format("{}: has been removed or changed since the run wrote it", file.string()));
   throw DiskError(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(reason)));
 }
 

@@ -27,6 +27,9 @@ class AppendedFile {
   std::int64_t size_ = 0;  ///< of the file after the last write
 };
 
+/// What is said of a file that others have taken from a run.
+inline constexpr std::string_view kTakenAway = "has been removed or changed since the run wrote it";
+
 /// What replace_file adds to a name for the file beside it: mkostemp's pattern, which wants these six letters.
 inline constexpr std::string_view kBeside = ".XXXXXX";
 

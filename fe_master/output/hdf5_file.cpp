@@ -97,6 +97,7 @@ void Hdf5File::reserve(std::uint64_t bytes, std::size_t data_sets) {
     reserve_space(file_, end - size + bytes + kTables * data_sets + kFile);
   } catch (const DiskError&) {
     broken_ = true;
+    require_in_place();
     throw;
   }
 }
@@ -106,17 +107,19 @@ void Hdf5File::finish() {
   const hid_t id = std::exchange(id_, -1);
   if (H5Fclose(id) < 0) fail_to_write("close", "/");
   if (mode_ == Mode::update) std::filesystem::remove(undo_file(file_));
-  if (!std::filesystem::exists(file_))  // what was written has no name any more
-    throw DiskError(fmt::format("{}: has been removed or changed since the run wrote it", file_.string()));
+  require_in_place();
+}
+
+void Hdf5File::require_in_place() const {
+  if (!std::filesystem::exists(file_)) throw DiskError(fmt::format("{}: {}", file_.string(), kTakenAway));
 }
 
 void Hdf5File::fail_to_write(std::string_view what, std::string_view path) {
   const int reason = errno;
   broken_ = true;
-  const bool has_reason = reason != 0 && reason != ENOENT;  // else HDF5 does not find what it has written
-  throw DiskError(
-      fmt::format("{}: cannot {} ({}): {}", file_.string(), what, path,
-                  has_reason ? std::strerror(reason) : "has been removed or changed since the run wrote it"));
+  std::string_view why = reason != 0 ? std::strerror(reason) : "refused by HDF5";
+  if (mode_ == Mode::update && (reason == 0 || reason == ENOENT)) why = kTakenAway;  // it misses what it has written
+  throw DiskError(fmt::format("{}: cannot {} ({}): {}", file_.string(), what, path, why));
 }
 
 void Hdf5File::fail(std::string_view what, std::string_view path) const {

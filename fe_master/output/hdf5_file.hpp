@@ -66,6 +66,7 @@ class Hdf5File {
  private:
   std::size_t count(const std::string& path, const Shape& lengths) const;
   [[noreturn]] void fail(std::string_view what, std::string_view path) const;
+  void require_in_place() const;  ///< throws DiskError where there is no file of that name any more
   [[noreturn]] void fail_to_write(std::string_view what, std::string_view path);
   void write_raw(const std::string& path, const void* values, std::size_t count, const Shape& shape,
                  std::int64_t memory_type, std::int64_t file_type);

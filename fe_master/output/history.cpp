@@ -6,6 +6,7 @@
 #include <cassert>
 #include <fstream>
 
+#include "disk_file.hpp"
 #include "errors.hpp"
 
 namespace femxdem {
@@ -46,8 +47,7 @@ History::History(const std::filesystem::path& file, const std::vector<std::strin
 
 void History::add(const StepRecord& record) {
   assert(record.monitors.size() == monitors_);
-  if (!stream_->is_in_place())
-    throw DiskError(fmt::format("{}: has been removed or changed since the run wrote it", file_.string()));
+  if (!stream_->is_in_place()) throw DiskError(fmt::format("{}: {}", file_.string(), kTakenAway));
   std::string row =
       fmt::format("{},{:.17g},{:.17g},{},{},{:.17g},{},{:.17g}", record.step, record.time, record.load_factor,
                   record.iterations, record.evaluations, record.dem_steps, record.histories, record.residual);

@@ -4,6 +4,7 @@
 
 #include <cassert>
 
+#include "disk_file.hpp"
 #include "errors.hpp"
 
 namespace femxdem {
@@ -154,7 +155,7 @@ void Results::write(const FieldStep& step) {
     grids_[step.step] = grid(h5, fmt::format("{:06d}", step.step));
     h5.finish();
   } catch (const Hdf5Error& error) {
-    throw DiskError(fmt::format("{}; it has been removed or changed since the run wrote it", error.what()));
+    throw DiskError(fmt::format("{}; it {}", error.what(), kTakenAway));
   }
   write_xdmf();
 }

@@ -3,7 +3,6 @@
     test_program.py FEMXDEM CASE      FEMXDEM: the executable; CASE: a small case on volume elements
 """
 
-import csv
 import json
 import os
 import signal
@@ -21,9 +20,9 @@ FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation" / "cluster"))
 sys.dont_write_bytecode = True
 
-from same_results import differences
+from same_results import OF_THE_CLOCK, differences
+from same_results import rows as history
 
-TIME_COLUMNS = ("dem_seconds", "wall_s")
 FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
 CACHE = Path(FOLDER.name) / "packings"
 IN_ORDER = ("--set", "ve.sorted_contacts=true")  # sums of forces have the bits of compact cells
@@ -44,17 +43,11 @@ def run(name, *arguments, ranks=1):
     return out, done.returncode, done.stdout + done.stderr
 
 
-def history(out):
-    """Rows of history.csv as text, without the columns that depend on the clock."""
-    with open(out / "history.csv") as file:
-        return [{k: v for k, v in row.items() if k not in TIME_COLUMNS} for row in csv.DictReader(file)]
-
-
 def fields(out):
     """{path: values} of the last step's points, without what depends on the clock."""
     with h5py.File(out / "results.h5") as h5:
         last = h5["steps"][max(h5["steps"])]["points"]
-        return {name: last[name][()] for name in last if not name.endswith("seconds")}
+        return {name: last[name][()] for name in last if name not in OF_THE_CLOCK}
 
 
 def engine(out):

@@ -89,7 +89,7 @@ def report_as_it_was(engine, ve):
     volume_element._mean_rotation(engine._grains[ve].states)
 
 
-def fork_trial(engine, elements, L, n, report=lambda engine, ve: None):
+def fork_trial(engine, elements, L, n, whole_report):
     """Processor time [s] of a trial in a fork that makes those of all `elements`, as a rank's worker does, and the memory that
     it takes beside the committed state [MB]; both of one of them, the fork itself included."""
     end, begin = os.pipe()
@@ -99,7 +99,8 @@ def fork_trial(engine, elements, L, n, report=lambda engine, ve: None):
         for ve in elements:
             engine.deform(ve, L, n)
             engine.measure(ve, np.empty(9), np.empty(0), np.empty(9))
-            report(engine, ve)
+            if whole_report:
+                report_as_it_was(engine, ve)
         mine = sum(int(line.split()[1]) for line in open("/proc/self/smaps_rollup") if line.startswith("Private_Dirty"))
         os.write(begin, str(mine * 1024 / 1e6).encode())
         os._exit(0)
@@ -150,8 +151,7 @@ def measured(spheres, law, inertial_number, state=None):
     few = max(5, min(40, 40000 // len(committed)))
     times, trials = steps(engine, {name: ves[0] for name, ves in many.items()}, start, L, few), {}
     for name, ves in many.items():
-        report = [report_as_it_was] if name == "before" else []
-        forked = {n: [fork_trial(engine, ves, L, n, *report) for _ in range(FORKS)] for n in STEPS}
+        forked = {n: [fork_trial(engine, ves, L, n, name == "before") for _ in range(FORKS)] for n in STEPS}
         trials[name] = {n: [seconds for seconds, _ in found] for n, found in forked.items()}
         of_trial = float(np.median([memory for _, memory in forked[STEPS[-1]]]))
     for kernel in compact_cell.kernels():
