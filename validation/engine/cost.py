@@ -16,6 +16,7 @@ import sys
 import time
 from pathlib import Path
 
+os.environ["OMP_NUM_THREADS"] = "1"  # a trial is a fork, and would wait for its parent's threads for ever
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
