@@ -77,7 +77,7 @@ std::string to_json(const Summary& summary, const std::string& date, const std::
       {"checkpoint_seconds", number(summary.checkpoint_seconds)},
       {"checkpoint_bytes", number(static_cast<double>(summary.checkpoint_bytes))},
       {"peak_memory_master_bytes", number(static_cast<double>(summary.peak_memory_master))},
-      {"peak_memory_workers_bytes", number(static_cast<double>(summary.peak_memory_workers))},
+      {"peak_memory_points_bytes", number(static_cast<double>(summary.peak_memory_points))},
       {"case_hash", quoted_text(summary.case_hash)},
       {"date", quoted_text(date)},
       {"host", quoted_text(host)},

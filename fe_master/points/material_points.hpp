@@ -155,7 +155,8 @@ class LocalPoints : public MaterialPoints {
   virtual EngineCheck engine_check() const { return {}; }
   /// That work on them.
   virtual int threads() const { return 1; }
-  /// Largest memory so far of what stands behind the points [byte].
+  /// Largest memory so far of what stands behind the points [byte]: worker processes, or compact cells, which are part
+  /// of their rank's own memory.
   virtual std::uint64_t peak_memory() const = 0;
 };
 

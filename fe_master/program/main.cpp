@@ -114,7 +114,7 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
     summary.imbalance_before = statistics.last_move.before;
     summary.imbalance_after = statistics.last_move.after;
     summary.moved = statistics.moved;
-    summary.peak_memory_workers = account.peak_memory;
+    summary.peak_memory_points = account.peak_memory;
     summary.threads = local->threads();
     summary.engine = name_of(prepared.engine);
     summary.engine_check = describe(account.check);

@@ -40,7 +40,7 @@ COSTS = (  # of summary.json: key, words, unit, factor
     ("steps", "converged steps", "", 1), ("evaluations", "evaluations", "", 1), ("dem_steps", "DEM steps", "", 1),
     ("ranks", "ranks", "", 1), ("threads", "threads of each rank", "", 1), ("wall_seconds", "wall time", "s", 1),
     ("engine_seconds", "of all cores in the DEM", "s", 1), ("parallel_efficiency", "parallel efficiency", "", 1),
-    ("peak_memory_master_bytes", "memory of rank 0", "MB", 1e-6), ("peak_memory_workers_bytes", "memory of the workers", "MB", 1e-6),
+    ("peak_memory_master_bytes", "memory of rank 0", "MB", 1e-6), ("peak_memory_points_bytes", "memory of the volume elements (compact cells: within that of their ranks)", "MB", 1e-6),
 )  # fmt: skip
 
 

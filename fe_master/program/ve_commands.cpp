@@ -59,7 +59,7 @@ int with_volume_element(const Case& c, RunOptions& options, double trials, Use u
   const PreparedRun prepared = prepare_run(worker, c.ve, {single_ve(c)}, options);
   const auto point = make_local_points(prepared.engine, worker, c.ve, trials, options.folder, 1);
   options.complete = [&](Summary& summary) {
-    summary.peak_memory_workers = point->peak_memory();
+    summary.peak_memory_points = point->peak_memory();
     summary.threads = point->threads();
     summary.engine = name_of(prepared.engine);
     summary.engine_check = describe(point->engine_check());

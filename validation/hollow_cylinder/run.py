@@ -48,7 +48,7 @@ WALL = 1.0  # m, radius a
 UNIFORM = np.pi / (2 * np.sqrt(2))  # radial displacement over the length of the quarter's mean displacement, where it is uniform
 HEADER = [
     "| row | elements, points | ended | sigma_int / sigma_0 at the end | wall u/a at 4 sigma_0, at the end | evaluations a step, most "
-    "| rejected | DEM steps | wall [s] | core hours | memory of the process and its workers [GB] |",
+    "| rejected | DEM steps | wall [s] | core hours | memory of the process, of its compact cells [GB] |",
     "|---|---|---|---|---|---|---|---|---|---|---|",
 ]
 BANDS = [
@@ -74,7 +74,7 @@ def memory(run):
     if not file.exists():
         return ""
     summary = json.loads(file.read_text())
-    return " + ".join(f"{summary[key] / 1e9:.1f}" for key in ("peak_memory_master_bytes", "peak_memory_workers_bytes"))
+    return ", ".join(f"{summary[key] / 1e9:.1f}" for key in ("peak_memory_master_bytes", "peak_memory_points_bytes"))
 
 
 def table_row(name, run):
