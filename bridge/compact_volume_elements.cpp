@@ -21,16 +21,6 @@
 namespace femxdem {
 namespace {
 
-/// The stress at the end of a trial, which its report holds [Pa].
-Tensor2 end_stress(const PointReport& report) {
-  Tensor2 s;
-  s(0, 0) = report["end_stress_xx"], s(1, 1) = report["end_stress_yy"], s(2, 2) = report["end_stress_zz"];
-  s(0, 1) = s(1, 0) = report["end_stress_xy"];
-  s(1, 2) = s(2, 1) = report["end_stress_yz"];
-  s(2, 0) = s(0, 2) = report["end_stress_zx"];
-  return s;
-}
-
 /// A number in [0, 1) that the trial's number and the point decide (splitmix64, Steele, Lea, Flood 2014).
 double drawn(std::uint64_t trial) {
   std::uint64_t z = trial * 0x9e3779b97f4a7c15ull + 0x9e3779b97f4a7c15ull;

@@ -7,6 +7,15 @@
 
 namespace femxdem {
 
+Tensor2 end_stress(const PointReport& report) {
+  Tensor2 s;
+  s(0, 0) = report["end_stress_xx"], s(1, 1) = report["end_stress_yy"], s(2, 2) = report["end_stress_zz"];
+  s(0, 1) = s(1, 0) = report["end_stress_xy"];
+  s(1, 2) = s(2, 1) = report["end_stress_yz"];
+  s(2, 0) = s(0, 2) = report["end_stress_zx"];
+  return s;
+}
+
 std::vector<std::pair<int, std::vector<std::size_t>>> StateSource::points_of_states() const {
   std::vector<std::pair<int, std::vector<std::size_t>>> shares;
   std::unordered_map<int, std::size_t> place;

@@ -55,6 +55,9 @@ struct PointReport {
   double operator[](std::string_view field) const { return values[report_index(field)]; }
 };
 
+/// Its stress at the end of the trial [Pa], in the frame of the stretch.
+Tensor2 end_stress(const PointReport& report);
+
 /// Failure of a material point: a value, never an exit.
 struct Failure {
   std::size_t point = 0;  ///< index in the batch

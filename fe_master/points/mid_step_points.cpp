@@ -20,4 +20,11 @@ std::vector<Response> MidStepPoints::evaluate(std::span<const Tensor2> F, Operat
   return responses;
 }
 
+std::vector<Tensor2> MidStepPoints::end_stresses(std::span<const Tensor2> F, std::span<const Response> responses) {
+  std::vector<Tensor2> stresses;
+  for (std::size_t p = 0; p < F.size(); ++p)
+    stresses.push_back(rotate(end_stress(responses[p].report), polar_decomposition(F[p]).R));
+  return stresses;
+}
+
 }  // namespace femxdem

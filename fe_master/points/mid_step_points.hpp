@@ -9,7 +9,9 @@ namespace femxdem {
 /// start to
 ///   F_end = F_n + (F - F_n) / theta,
 /// and their stress, which comes in the frame of F_end = R_end U_end, is turned to that of F: R R_end^T. So residual
-/// and operators see one F and the stress of that F, to second order in the step. theta = 1: as if it were not there.
+/// and operators see one F and the stress of that F, to second order in the step. What is asked of them there leaves
+/// (1 - theta) of what the start of the step lacked, so that an elastic point has nothing of it at the end; asked for
+/// all of it, they would overshoot by (1 - theta) / theta, step after step. theta = 1: as if it were not there.
 class MidStepPoints : public MaterialPoints {
  public:
   /// points is kept by reference. theta: in (0, 1].
@@ -26,6 +28,8 @@ class MidStepPoints : public MaterialPoints {
   Quantity within(const Quantity& start, const Quantity& end) const {
     return theta_ == 1 ? end : Quantity(start + theta_ * (end - start));
   }
+  /// Stresses at the end of the trials that gave these answers, of deformation gradients F there [Pa].
+  static std::vector<Tensor2> end_stresses(std::span<const Tensor2> F, std::span<const Response> responses);
   /// Deformation gradients (size()) at the start of the next step.
   void start_from(std::span<const Tensor2> F) { start_.assign(F.begin(), F.end()); }
 

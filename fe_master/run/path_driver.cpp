@@ -82,6 +82,7 @@ void PathDriver::begin_segment(const PathSegment& segment) {
   E_start_ = path_strain(F_);
   stress_start_ = path_components(response_.stress);
   fraction_ = last_fraction_ = end_ = 0;
+  lacking_ = PathVector::Zero();
 }
 
 bool PathDriver::stress_controlled(int component) const { return is_given(segment_.stress[component]); }
@@ -117,7 +118,7 @@ PathVector PathDriver::stress_target(double fraction) const {
 }
 
 /// Start of the iterations: the last increment extrapolated, corrected for the carried residual, the change of the
-/// stress targets and the prescribed strains.
+/// stress targets, the prescribed strains, and what the step's start lacks, with which its stresses begin.
 PathVector PathDriver::predict(double fraction, double end) const {
   const double factor = last_fraction_ > 0 ? (fraction - fraction_) / last_fraction_ : 0;
   const PathVector E = path_strain(F_);
@@ -125,7 +126,8 @@ PathVector PathDriver::predict(double fraction, double end) const {
   PathVector given = point_.within<PathVector>(path_strain(F_end_), strain_target(end)) - guess;
   for (const int c : free_components()) given[c] = 0;
   const PathVector extrapolated = factor * (stress_target(fraction_) - stress_target(fraction_ - last_fraction_));
-  const PathVector missing = stress_target(fraction) - extrapolated - path_components(response_.stress);
+  const PathVector missing = stress_target(fraction) + (1 - point_.theta()) * lacking_ - extrapolated -
+                             path_components(response_.stress) - lacking_;
   return guess + correction(E, response_.stress, missing, given);
 }
 
@@ -164,7 +166,8 @@ PathStep PathDriver::solve(double end) {
   const double fraction = point_.within(end_, end);
   const std::vector<int> free = free_components();
   const bool by_gradient = !segment_.deformation_gradient.empty();
-  const PathVector committed = path_strain(F_), target = stress_target(fraction);
+  const PathVector committed = path_strain(F_);
+  const PathVector target = stress_target(fraction) + (1 - point_.theta()) * lacking_;
   point_.start_from(std::array{F_end_});
   point_.begin_step();
   tangent_->begin_step(F_, response_.stress);
@@ -241,6 +244,10 @@ void PathDriver::commit() {
   fraction_ = trial_fraction_;
   end_ = trial_end_;
   F_end_ = point_.end(F_end_, trial_F_);
+  if (point_.theta() < 1) {
+    const Tensor2 stress = MidStepPoints::end_stresses(std::array{F_end_}, std::array{trial_}).front();
+    lacking_ = path_components(stress) - stress_target(end_);
+  }
   F_ = trial_F_;
   response_ = trial_;
 }
@@ -251,7 +258,8 @@ void PathDriver::visit_state(Driver& driver, Visit visit) {
   for (auto* number : {&driver.fraction_, &driver.end_, &driver.last_fraction_}) visit(number, 1);
   for (auto* T : {&driver.R_, &driver.F_start_, &driver.F_, &driver.F_end_, &driver.response_.stress})
     visit(T->data(), 9);
-  for (auto* v : {&driver.E_start_, &driver.stress_start_, &driver.last_E_change_}) visit(v->data(), 6);
+  for (auto* v : {&driver.E_start_, &driver.stress_start_, &driver.last_E_change_, &driver.lacking_})
+    visit(v->data(), 6);
   visit(driver.response_.stiffness.data(), 81);
   visit(driver.response_.report.values.data(), driver.response_.report.values.size());
 }

@@ -101,6 +101,8 @@ class PathDriver {
   double end_ = 0, trial_end_ = 0;                 // where the step ends
   double last_fraction_ = 0;                       // that the last committed step of this segment advanced
   PathVector last_E_change_ = PathVector::Zero();  // of that step
+  // Stress beyond its target at the end of that step, of controlled components; 0 for theta = 1.
+  PathVector lacking_ = PathVector::Zero();
   Tensor2 F_ = Tensor2::Identity(), trial_F_ = Tensor2::Identity();
   Tensor2 F_end_ = Tensor2::Identity();  // committed, of the end of the step
   Response response_, trial_;

@@ -45,6 +45,7 @@ Equilibrium undeformed(const Formulation& formulation, MaterialPoints& points, c
   state.x = Eigen::VectorXd::Zero(formulation.unknowns());
   state.multipliers = Eigen::VectorXd::Zero(formulation.multipliers());
   state.load_factor = loads.released_factor(0);
+  state.leaving = state.x;
   state.F = formulation.deformation(state.x);
   points.begin_step();
   state.responses = points.evaluate(state.F, Operator::elastic);
@@ -76,8 +77,10 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       assembler_(formulation, prescribed_),
       committed_(undeformed(formulation, points, loads)),
       start_(committed_.x),
-      last_{0, Eigen::VectorXd::Zero(formulation.unknowns()), Eigen::VectorXd::Zero(formulation.multipliers()),
-            Eigen::VectorXd::Zero(formulation.unknowns()), 0},
+      start_multipliers_(committed_.multipliers),
+      start_load_factor_(committed_.load_factor),
+      lacking_(Eigen::VectorXd::Zero(formulation.unknowns())),
+      last_{0, lacking_, committed_.multipliers, lacking_, 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
       reuse_(parameters.reuse_below, points.size()),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
@@ -85,6 +88,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
   points_.commit();
   committed_.internal = assembler_.force(committed_.configuration(), stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
+  if (points_.theta() < 1) lacking_ = -free_part(committed_.out_of_balance());
 }
 
 StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTarget>& target) {
@@ -139,6 +143,7 @@ void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
   reuse_.begin_step();
   factorised_in_step_ = false;
   trial.time = trial_time(dt);
+  trial.leaving = (1 - points_.theta()) * lacking_;
   predict(trial, dt);
   const bool reaches_start = time_ <= parameters_.start_time && time_ + dt > parameters_.start_time;
   if (parameters_.start_amplitude > 0 && reaches_start) start_at_random(trial);
@@ -147,7 +152,8 @@ void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
 double NonlinearSolver::trial_time(double dt) const { return points_.within(time_, time_ + dt); }
 
 /// Start of the iterations: the last step's increment extrapolated, corrected for the carried residual, the change of
-/// the loads and the prescribed values; an elastic predictor where there is no last increment.
+/// the loads, the prescribed values, and what the step's start lacks, with which its stresses begin; an elastic
+/// predictor where there is no last increment.
 void NonlinearSolver::predict(Equilibrium& trial, double dt) {
   const double factor = parameters_.predictor == Predictor::extrapolate && last_.dt > 0 ? span(dt) / last_.dt : 0;
   trial.x += factor * last_.x;
@@ -161,7 +167,7 @@ void NonlinearSolver::predict(Equilibrium& trial, double dt) {
   trial.load_factor =
       target_ ? committed_.load_factor + factor * last_.load_factor : loads_.released_factor(trial.time);
   const Eigen::VectorXd external = loads_.external_force(trial.x, trial.time, trial.load_factor);
-  const Eigen::VectorXd residual = external - factor * last_.external - committed_.internal;
+  const Eigen::VectorXd residual = external + trial.leaving - factor * last_.external - committed_.internal - lacking_;
   if (const auto c = correction(committed_, trial.x, residual, change)) {
     trial.x += c->x;
     trial.load_factor += c->load_factor;
@@ -273,7 +279,7 @@ double NonlinearSolver::gap(const Equilibrium& trial) const {
 std::optional<Eigen::VectorXd> NonlinearSolver::correct(const Equilibrium& trial, Iteration& now) {
   const auto start = std::chrono::steady_clock::now();
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(formulation_.unknowns());
-  const auto c = correction(trial, trial.x, trial.external - trial.internal, none);
+  const auto c = correction(trial, trial.x, trial.out_of_balance(), none);
   now.solve_seconds = seconds_since(start);
   now.gap = gap(trial);
   if (!c) return std::nullopt;
@@ -311,7 +317,7 @@ AndersonAcceleration NonlinearSolver::acceleration() const {
 /// Out-of-balance forces of all unknowns as forces, over the norm of the reactions and external forces; 0 where
 /// prescribed.
 Eigen::VectorXd NonlinearSolver::scaled_residual(const Equilibrium& state) const {
-  Eigen::VectorXd residual = state.external - state.internal;
+  Eigen::VectorXd residual = state.out_of_balance();
   for (Eigen::Index i = 0; i < residual.size(); ++i) residual[i] /= formulation_.residual_length(static_cast<int>(i));
   double reactions = 0;
   for (const int i : prescribed_) {
@@ -369,9 +375,32 @@ void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistor
   }
 }
 
+/// Internal less external forces at the end of the step of this trial, of the stresses there, where nothing is
+/// prescribed.
+Eigen::VectorXd NonlinearSolver::lacking_at_end(const Equilibrium& trial, double dt) {
+  if (points_.theta() == 1) return lacking_;
+  Equilibrium end = trial;
+  end.time = time_ + dt;
+  end.x = points_.end(start_, trial.x);
+  end.multipliers = start_multipliers_ = points_.end(start_multipliers_, trial.multipliers);
+  end.load_factor = start_load_factor_ =
+      target_ ? points_.end(start_load_factor_, trial.load_factor) : loads_.released_factor(end.time);
+  end.F = formulation_.deformation(end.x);
+  end.internal = assembler_.force(end.configuration(), MidStepPoints::end_stresses(end.F, end.responses));
+  end.external = loads_.external_force(end.x, end.time, end.load_factor);
+  return free_part(end.internal - end.external);
+}
+
+/// A vector of all unknowns with zeros where they are prescribed.
+Eigen::VectorXd NonlinearSolver::free_part(Eigen::VectorXd values) const {
+  for (const int i : prescribed_) values[i] = 0;
+  return values;
+}
+
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   points_.commit();
   reuse_.commit();
+  lacking_ = lacking_at_end(trial, dt);
   last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
            trial.external - committed_.external, trial.load_factor - committed_.load_factor};
   committed_ = std::move(trial);
@@ -388,14 +417,17 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);
   operators_.save(arrays);
   reuse_.save(arrays);
-  arrays.emplace_back("solver.time",
-                      std::vector<double>{committed_.time, last_.dt, committed_.load_factor, last_.load_factor, time_});
+  arrays.emplace_back("solver.time", std::vector<double>{committed_.time, last_.dt, committed_.load_factor,
+                                                         last_.load_factor, time_, start_load_factor_});
   add(arrays, "solver.x", committed_.x);
   add(arrays, "solver.multipliers", committed_.multipliers);
   add(arrays, "solver.last_change", last_.x);
   add(arrays, "solver.last_multiplier_change", last_.multipliers);
   add(arrays, "solver.last_external_change", last_.external);
   add(arrays, "solver.internal", committed_.internal);
+  add(arrays, "solver.leaving", committed_.leaving);
+  add(arrays, "solver.lacking", lacking_);
+  add(arrays, "solver.start_multipliers", start_multipliers_);
   std::vector<double> answers;
   for (const Response& r : committed_.responses) {
     answers.insert(answers.end(), r.stress.data(), r.stress.data() + 9);
@@ -413,11 +445,15 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   committed_.time = time.at(0);
   committed_.load_factor = time.at(2);
   time_ = time.at(4);
+  start_load_factor_ = time.at(5);
   start_ = formulation_.start();
   committed_.x = find_vector(arrays, "solver.x");
   committed_.multipliers = find_vector(arrays, "solver.multipliers");
   last_ = {time.at(1), find_vector(arrays, "solver.last_change"), find_vector(arrays, "solver.last_multiplier_change"),
            find_vector(arrays, "solver.last_external_change"), time.at(3)};
+  lacking_ = find_vector(arrays, "solver.lacking");
+  start_multipliers_ = find_vector(arrays, "solver.start_multipliers");
+  committed_.leaving = find_vector(arrays, "solver.leaving");
   committed_.F = formulation_.deformation(committed_.x);
   const double* value = find_array(arrays, "solver.responses").data();
   for (Response& r : committed_.responses) {

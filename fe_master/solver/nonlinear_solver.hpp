@@ -59,8 +59,12 @@ struct Equilibrium {
   std::vector<Response> responses;
   Eigen::VectorXd internal,
       external;  ///< nodal forces of all unknowns [N per thickness, N]; their difference: reaction
+  /// What internal forces may have beyond the external ones: of what the step's start lacked, that which is still on
+  /// its way out (MidStepPoints); 0 for theta = 1 and where prescribed.
+  Eigen::VectorXd leaving;
 
   Configuration configuration() const { return {x, multipliers, F}; }
+  Eigen::VectorXd out_of_balance() const { return external + leaving - internal; }
 };
 
 /// Equilibrium of the finite elements with their material points, step by step.
@@ -70,8 +74,8 @@ struct Equilibrium {
 ///
 /// Where the points answer with the mean over their trials (SolverParameters::answer_at = theta < 1), forces balance at
 /// t_n + theta dt: the unknowns of a step are those of that moment, loads are taken there, and what is committed is
-/// x_n + (x - x_n) / theta. Prescribed values are met at the end. Second order in dt (README of
-/// validation/quasi_static).
+/// x_n + (x - x_n) / theta. Prescribed values are met at the end. Of what the stresses at the step's start lack of
+/// balance, 1 - theta may be left at theta. Second order in dt (README of validation/quasi_static).
 class NonlinearSolver {
  public:
   /// Evaluates the undeformed state, whose stiffness C_1111 (of the first point) gives the penalty of the constraints
@@ -108,6 +112,8 @@ class NonlinearSolver {
   double trial_time(double dt) const;
   void begin_step(Equilibrium& trial, double dt);
   void predict(Equilibrium& trial, double dt);
+  Eigen::VectorXd lacking_at_end(const Equilibrium& trial, double dt);
+  Eigen::VectorXd free_part(Eigen::VectorXd values) const;
   void start_at_random(Equilibrium& trial) const;
   bool evaluate(Equilibrium& trial, StepResult& result);
   double reuse_error(const Equilibrium& trial) const;
@@ -140,8 +146,11 @@ class NonlinearSolver {
   bool factorised_in_step_ = false;
   Equilibrium committed_;
   double time_ = 0;        // of the end of the last step
-  Eigen::VectorXd start_;  // unknowns there
-  struct Increment {       // between the last two equilibria
+  Eigen::VectorXd start_;  // unknowns there, and the next three
+  Eigen::VectorXd start_multipliers_;
+  double start_load_factor_ = 0;
+  Eigen::VectorXd lacking_;  // internal less external forces, of the stresses there; 0 for theta = 1
+  struct Increment {         // between the last two equilibria
     double dt = 0;
     Eigen::VectorXd x, multipliers, external;
     double load_factor = 0;

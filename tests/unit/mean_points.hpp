@@ -8,11 +8,11 @@ namespace femxdem {
 
 /// Laws in closed form that answer as volume elements with ve.answer = "mean" do: with the mean of the stress over the
 /// way from the committed F to the trial's, taken in the frame of the material and turned to that of the end. Weight 1
-/// + late (2 t / T - 1), late = 6 theta - 3.
+/// + late (2 t / T - 1), late = 6 theta - 3. theta = 1: the stress of the end.
 class MeanPoints : public MaterialPoints {
  public:
   MeanPoints(std::vector<AnalyticLaw> laws, double theta)
-      : laws_(std::move(laws)), late_((6 * theta - 3) / (1 + 2.0 / (kParts * kParts))) {
+      : laws_(std::move(laws)), theta_(theta), late_((6 * theta - 3) / (1 + 2.0 / (kParts * kParts))) {
     for (const AnalyticLaw& law : laws_) committed_.push_back(initial_state(law));
     trial_ = committed_;
   }
@@ -46,7 +46,11 @@ class MeanPoints : public MaterialPoints {
       sum += (k == kParts ? 0.5 : 1.0) / kParts * (1 + late_ * (2 * done - 1)) * unrotated(state);
     }
     trial_[p] = state;
-    response.stress = rotate(sum, polar_decomposition(F).R);
+    if (theta_ < 1) response.stress = rotate(sum, polar_decomposition(F).R);
+    const Tensor2 end = unrotated(state);
+    response.report["end_stress_xx"] = end(0, 0), response.report["end_stress_yy"] = end(1, 1);
+    response.report["end_stress_zz"] = end(2, 2), response.report["end_stress_xy"] = end(0, 1);
+    response.report["end_stress_yz"] = end(1, 2), response.report["end_stress_zx"] = end(2, 0);
     return response;
   }
   static Tensor2 unrotated(const LawState& state) {
@@ -54,7 +58,7 @@ class MeanPoints : public MaterialPoints {
   }
 
   std::vector<AnalyticLaw> laws_;
-  double late_;
+  double theta_, late_;
   std::vector<LawState> committed_, trial_;
 };
 
