@@ -93,6 +93,16 @@ void CompactVolumeElements::begin_step() {
   for (Point& point : points_) point.strained.frozen_steps = 0;
 }
 
+std::vector<double> CompactVolumeElements::costs(std::span<const Tensor2> F) const {
+  std::vector<double> costs(size());
+  for (std::size_t p = 0; p < size(); ++p) {
+    StrainedPoint point = points_[p].strained;
+    const Straining plan = plan_straining(options_, point, points_[p].time_step, p, F[p]);
+    costs[p] = plan.refusal ? 0 : trial_cost(static_cast<double>(plan.steps), points_[p].report["contacts"]);
+  }
+  return costs;
+}
+
 std::vector<Response> CompactVolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
   require_answerable(wanted, F.size(), size());
   std::vector<Straining> plans(F.size());

@@ -38,6 +38,7 @@ class CompactVolumeElements : public LocalPoints {
   std::size_t size() const override { return points_.size(); }
   void begin_step() override;
   /// Throws EngineDiffers.
+  std::vector<double> costs(std::span<const Tensor2> F) const override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override;
   std::vector<PointReport> reports() override;

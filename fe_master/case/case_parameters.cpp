@@ -204,7 +204,7 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
       parameter("threads", &V::threads, "", kNotNegative,
                 "of a rank, for compact cells; 0: the processors that it may use"),
       parameter("balance", &V::balance, "", kAny,
-                "at checkpoints volume elements move to other ranks where that pays; the results are the same"),
+                "volume elements move to other ranks where that pays: compact cells before a step, those of YADE at checkpoints"),
       parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
                 "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
       word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),

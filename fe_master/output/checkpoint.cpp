@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include "disk_file.hpp"
 #include "errors.hpp"
@@ -26,7 +27,10 @@ class StateWriter {
     const int number = number_of(state);
     for (const std::size_t point : points) number_of_point_[point] = number;
   }
-  void finish() { h5_.write("/state_of_point", number_of_point_, {number_of_point_.size()}); }
+  void finish(const std::vector<int>& histories) {
+    h5_.write("/state_of_point", number_of_point_, {number_of_point_.size()});
+    h5_.write("/history_of_point", histories.empty() ? number_of_point_ : histories, {number_of_point_.size()});
+  }
   std::size_t states() const { return known_.size(); }
 
  private:
@@ -56,7 +60,7 @@ std::uint64_t size_of(const Checkpoint& checkpoint) {
 
 std::size_t write_file(const fs::path& file, const Checkpoint& checkpoint, MaterialPoints& points) {
   Hdf5File h5(file, Hdf5File::Mode::create);
-  h5.reserve(size_of(checkpoint) + 4 * points.size(), checkpoint.arrays.size() + checkpoint.versions.size() + 8);
+  h5.reserve(size_of(checkpoint) + 8 * points.size(), checkpoint.arrays.size() + checkpoint.versions.size() + 9);
   h5.set_attribute("/", "step", checkpoint.step);
   h5.set_attribute("/", "time", checkpoint.time);
   h5.set_attribute("/", "dt", checkpoint.dt);
@@ -72,7 +76,7 @@ std::size_t write_file(const fs::path& file, const Checkpoint& checkpoint, Mater
   StateWriter states(h5, points.size());
   points.save_each(
       [&](const std::string& state, std::span<const std::size_t> of_points) { states.take(state, of_points); });
-  states.finish();
+  states.finish(points.histories());
   h5.finish();
   return states.states();
 }
@@ -165,8 +169,11 @@ Checkpoint CheckpointFile::read(const std::map<std::string, std::string>& versio
 
 StateSource CheckpointFile::states() const {
   StateSource source;
-  for (const double number : read_or_refuse([&] { return h5_->read("/state_of_point"); }))
-    source.number_of_point.push_back(static_cast<int>(number));
+  for (const auto& [numbers, place] : {std::pair{&source.number_of_point, "/state_of_point"},
+                                       std::pair{&source.history_of_point, "/history_of_point"}}) {
+    for (const double number : read_or_refuse([&] { return h5_->read(place); }))
+      numbers->push_back(static_cast<int>(number));
+  }
   source.read = [this](int number) { return read_or_refuse([&] { return h5_->read_bytes(place_of(number)); }); };
   return source;
 }

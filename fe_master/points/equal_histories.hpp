@@ -23,6 +23,8 @@ class EqualHistories {
   std::size_t trial(std::span<const Tensor2> F);
   /// The last trial belongs to the histories.
   void commit() { committed_ = trial_; }
+  /// Of each point the number of its committed one.
+  const std::vector<int>& committed() const { return committed_; }
 
  private:
   std::vector<int> committed_, trial_;  ///< the number of each point's history

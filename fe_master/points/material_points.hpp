@@ -93,6 +93,7 @@ using TakeState = std::function<void(const std::string& state, std::span<const s
 /// Saved states, each of them in memory only when it is read.
 struct StateSource {
   std::vector<int> number_of_point;      ///< of its state; points with equal states have equal numbers
+  std::vector<int> history_of_point;     ///< see MaterialPoints::histories()
   std::function<std::string(int)> read;  ///< the state of that number
   /// Number and points of each state, in the order of their first points.
   std::vector<std::pair<int, std::vector<std::size_t>>> points_of_states() const;
@@ -113,6 +114,9 @@ class MaterialPoints {
   virtual std::size_t size() const = 0;
   /// How many different histories the last trial has made of them (EqualHistories).
   virtual std::size_t distinct() const { return size(); }
+  /// Of each point the number of its committed history, equal ones for equal histories, whose states may still differ
+  /// in their bytes; none where nobody has looked.
+  virtual std::vector<int> histories() const { return {}; }
   /// A new load step starts (also after a cut): whatever is frozen during a step's iterations, such as the number of
   /// DEM steps of a point, is chosen anew at the next evaluate.
   virtual void begin_step() {}
@@ -139,6 +143,9 @@ struct EngineCheck {
   long trials = 0, equal = 0;
 };
 
+/// What a trial costs, in DEM steps times contacts; counted, so that it repeats.
+inline double trial_cost(double dem_steps, double contacts) { return dem_steps * (contacts > 1 ? contacts : 1); }
+
 /// The material points that one rank serves; the bridge's volume elements, or a law in closed form in tests.
 class LocalPoints : public MaterialPoints {
  public:
@@ -155,6 +162,9 @@ class LocalPoints : public MaterialPoints {
   /// The committed state of these points becomes this one.
   virtual void load_into(std::span<const std::size_t> points, const std::string& state) = 0;
   void load_each(const StateSource& states) override;
+  /// trial_cost() of each point's next trial, to F; none where only the trial itself tells, or where a point does not
+  /// keep all of its bits on its way to another rank.
+  virtual std::vector<double> costs(std::span<const Tensor2>) const { return {}; }
   virtual EngineCheck engine_check() const { return {}; }
   /// That work on them.
   virtual int threads() const { return 1; }

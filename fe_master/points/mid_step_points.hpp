@@ -35,6 +35,7 @@ class MidStepPoints : public MaterialPoints {
 
   std::size_t size() const override { return points_.size(); }
   std::size_t distinct() const override { return points_.distinct(); }
+  std::vector<int> histories() const override { return points_.histories(); }
   void begin_step() override { points_.begin_step(); }
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { points_.commit(); }

@@ -124,10 +124,24 @@ void add(LocalPoints& local, PacketReader input) {
   flush();
 }
 
-std::string evaluate(LocalPoints& local, PacketReader input) {
-  const auto wanted = static_cast<Operator>(input.get<int>());
+std::vector<Tensor2> gradients(const LocalPoints& local, PacketReader& input) {
   std::vector<Tensor2> F(local.size());
   for (Tensor2& gradient : F) input.get_doubles(gradient.data(), 9);
+  return F;
+}
+
+/// Output: the number of costs, 0 or one for each local point, and the costs.
+std::string cost(LocalPoints& local, PacketReader input) {
+  const std::vector<double> costs = local.costs(gradients(local, input));
+  PacketWriter output;
+  output.put(costs.size());
+  output.put_doubles(costs.data(), costs.size());
+  return output.take();
+}
+
+std::string evaluate(LocalPoints& local, PacketReader input) {
+  const auto wanted = static_cast<Operator>(input.get<int>());
+  const std::vector<Tensor2> F = gradients(local, input);
   PacketWriter output;
   for (const Response& response : local.evaluate(F, wanted)) put_response(output, response, wanted != Operator::none);
   return output.take();
@@ -185,6 +199,8 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
     case Order::begin_step:
       local.begin_step();
       break;
+    case Order::cost:
+      return cost(local, PacketReader(input));
     case Order::evaluate:
       return evaluate(local, PacketReader(input));
     case Order::commit:

@@ -87,17 +87,48 @@ std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner,
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
                            int ranks, double price) {
   const std::vector<int> then = reassign(older, owner, ranks, kBalanced);
-  std::vector<double> moves(static_cast<std::size_t>(ranks), 0.0);
-  for (std::size_t p = 0; p < owner.size(); ++p) {
-    if (then[p] == owner[p]) continue;
-    ++moves[static_cast<std::size_t>(owner[p])];
-    ++moves[static_cast<std::size_t>(then[p])];
-  }
   const double gain = busiest(loads(latest, owner, ranks)) - busiest(loads(latest, then, ranks));
-  if (gain <= price * busiest(moves)) return owner;
+  if (gain <= price * busiest(moves(owner, then, ranks))) return owner;
   std::vector<double> all(older.begin(), older.end());
   for (std::size_t p = 0; p < all.size(); ++p) all[p] += latest[p];
   return reassign(all, owner, ranks, kBalanced);
+}
+
+std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, double price) {
+  const std::vector<double> now = loads(costs, owner, ranks);
+  const double limit = (1 + kBalanced) * mean(now);
+  std::vector<std::vector<std::size_t>> points(static_cast<std::size_t>(ranks));  // of each rank, the dearest first
+  for (const std::size_t point : dearest_first(costs)) points[static_cast<std::size_t>(owner[point])].push_back(point);
+  Ranking order = ranking(now);
+  while (order.size() > 1 && order.rbegin()->first > limit) {
+    auto giver = order.extract(std::prev(order.end())), taker = order.extract(order.begin());
+    auto& candidates = points[static_cast<std::size_t>(giver.value().second)];
+    const auto left = [&](std::size_t point) {
+      return std::max(giver.value().first - costs[point], taker.value().first + costs[point]) + price;
+    };
+    const double half = (giver.value().first - taker.value().first) / 2;
+    auto given =
+        std::partition_point(candidates.begin(), candidates.end(), [&](std::size_t p) { return costs[p] > half; });
+    if (given != candidates.begin() && (given == candidates.end() || left(*std::prev(given)) < left(*given))) --given;
+    if (given == candidates.end() || left(*given) >= giver.value().first) return owner;
+    owner[*given] = taker.value().second;
+    giver.value().first += price - costs[*given];
+    taker.value().first += price + costs[*given];
+    candidates.erase(given);  // what is taken stays
+    order.insert(std::move(giver));
+    order.insert(std::move(taker));
+  }
+  return owner;
+}
+
+std::vector<double> moves(std::span<const int> before, std::span<const int> after, int ranks) {
+  std::vector<double> moves(static_cast<std::size_t>(ranks), 0.0);
+  for (std::size_t p = 0; p < before.size(); ++p) {
+    if (after[p] == before[p]) continue;
+    ++moves[static_cast<std::size_t>(before[p])];
+    ++moves[static_cast<std::size_t>(after[p])];
+  }
+  return moves;
 }
 
 std::vector<double> loads(std::span<const double> costs, std::span<const int> owner, int ranks) {

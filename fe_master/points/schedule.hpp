@@ -28,6 +28,14 @@ std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner,
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
                            int ranks, double price);
 
+/// What pays where the costs are those to come: a point at a time goes from the busiest rank to the idlest, the one
+/// that leaves both with least, as long as that takes something off the busiest, which has more than 2 % above the
+/// mean. `price`: what it costs to give a point, and to take one.
+std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, double price);
+
+/// Points that each rank gives or takes.
+std::vector<double> moves(std::span<const int> before, std::span<const int> after, int ranks);
+
 /// DEM steps that it costs a rank to give a VE or to take one, at most: 0.2 s to save and to restore 1000 spheres in
 /// YADE, where a step takes 1.4 ms; 1 ms as compact cell, 0.07 ms.
 inline constexpr double kMoveSteps = 70;

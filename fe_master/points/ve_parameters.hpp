@@ -60,7 +60,7 @@ struct VeParameters {
   EngineChoice engine = EngineChoice::automatic;  ///< compact cells where they cover the scene and equal YADE's bits
   int check_every = 0;   ///< one trial of compact cells in so many is repeated in YADE; 0: about 20 a run
   int threads = 0;       ///< of a rank, for compact cells; 0: the processors that it may use
-  bool balance = false;  ///< at checkpoints VEs move to other ranks where that pays
+  bool balance = false;  ///< VEs move to other ranks where that pays
   bool sorted_contacts =
       false;               ///< YADE sums forces in the order of the spheres, as compact cells do: slower, same bits
   std::vector<int> seeds;  ///< pool of VEs, or empty: only seed

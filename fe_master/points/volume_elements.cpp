@@ -33,8 +33,8 @@ std::vector<std::vector<std::size_t>> shares(const std::vector<int>& owner, int 
 
 /// Of one trial; 0 where a law makes no steps.
 double cost(const PointReport& report) {
-  const double steps = report["dem_steps"], contacts = report["contacts"];
-  return std::isfinite(steps) ? steps * (contacts > 1 ? contacts : 1) : 0;
+  const double steps = report["dem_steps"];
+  return std::isfinite(steps) ? trial_cost(steps, report["contacts"]) : 0;
 }
 
 }  // namespace
@@ -67,11 +67,16 @@ VolumeElements::VolumeElements(MPI_Comm communicator, LocalPoints& local, const 
 
 VolumeElements::~VolumeElements() { command(communicator_, Order::end, {}, local_); }
 
-void VolumeElements::begin_step() { command(communicator_, Order::begin_step, {}, local_); }
+void VolumeElements::begin_step() {
+  command(communicator_, Order::begin_step, {}, local_);
+  if (trials_of_step_ > 0) trials_of_last_step_ = std::exchange(trials_of_step_, 0);
+}
 
 std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Operator wanted) {
   if (F.size() != size()) throw std::invalid_argument("evaluate: one deformation gradient per point");
   const auto start = std::chrono::steady_clock::now();
+  if (each_step_ && trials_of_step_ == 0) relieve_ranks(F);
+  ++trials_of_step_;
   std::vector<std::string> inputs;
   for (const auto& share : shares_) {
     PacketWriter packet;
@@ -101,18 +106,21 @@ void VolumeElements::count(const std::vector<Response>& responses, double second
     statistics_.trial_seconds += response.report["seconds"];
     statistics_.engine_seconds += response.report["engine_seconds"];
   }
-  double busiest = 0;
+  double busiest = 0, longest = 0;
   for (const auto& share : shares_) {
-    double load = 0;
+    double load = 0, taken = 0;
     for (const std::size_t point : share) {
       const double of_trial = cost(responses[point].report);
       latest_[point] += of_trial;
       load += of_trial;
+      taken += responses[point].report["seconds"];
     }
     busiest = std::max(busiest, load);
+    longest = std::max(longest, taken);
     statistics_.cost += load;
   }
   statistics_.critical_cost += busiest;
+  statistics_.critical_seconds += longest;
 }
 
 void VolumeElements::commit() {
@@ -201,7 +209,8 @@ void VolumeElements::load_each(const StateSource& states) {
     }
     command(communicator_, Order::load, inputs, local_);
   }
-  histories_ = EqualHistories(std::span<const int>(states.number_of_point));
+  const bool known = !states.history_of_point.empty();
+  histories_ = EqualHistories(known ? states.history_of_point : states.number_of_point);
 }
 
 std::vector<int> VolumeElements::owners() const {
@@ -216,30 +225,66 @@ Balance VolumeElements::balance(bool may_move) {
   const std::vector<int> now = owners();
   const double steps = statistics_.dem_steps - at_last_balance_.dem_steps;
   const double price = kMoveSteps * std::accumulate(latest_.begin(), latest_.end(), 0.0) / std::max(steps, 1.0);
-  const bool shared = static_cast<double>(distinct_) < kMostlyDistinct * static_cast<double>(size());
-  const std::vector<int> next = may_move && !shared ? rebalance(older_, latest_, now, ranks, price) : now;
-  std::vector<std::size_t> moving;
-  for (std::size_t p = 0; p < size(); ++p)
-    if (next[p] != now[p]) moving.push_back(p);
-  for (std::size_t first = 0; first < moving.size(); first += kMovedAtOnce)
-    move(std::span(moving).subspan(first, std::min(kMovedAtOnce, moving.size() - first)), next);
-  Balance balance{imbalance(loads(latest_, now, ranks)), imbalance(loads(latest_, next, ranks)), moving.size(),
+  const bool may = may_move && !shared();
+  const std::vector<int> next = may ? rebalance(older_, latest_, now, ranks, price) : now;
+  const std::size_t moved = move_to(next);
+  Balance balance{imbalance(loads(latest_, now, ranks)),
+                  imbalance(loads(latest_, next, ranks)),
+                  moved,
                   statistics_.efficiency(at_last_balance_, ranks),
-                  statistics_.clock_efficiency(at_last_balance_, ranks * local_.threads())};
-  if (!moving.empty()) statistics_.last_move = balance;
-  statistics_.moved += static_cast<long>(moving.size());
+                  statistics_.clock_efficiency(at_last_balance_, ranks),
+                  statistics_.working_share(at_last_balance_, ranks * local_.threads())};
+  if (moved > 0) statistics_.last_move = balance;
+  balance.moved = static_cast<std::size_t>(statistics_.moved - at_last_balance_.moved);
   at_last_balance_ = statistics_;
-  for (std::size_t p = 0; p < size(); ++p) older_[p] = shared ? 0 : (older_[p] + latest_[p]) / 2;
+  for (std::size_t p = 0; p < size(); ++p) older_[p] = shared() ? 0 : (older_[p] + latest_[p]) / 2;
   std::fill(latest_.begin(), latest_.end(), 0.0);
   return balance;
 }
 
+bool VolumeElements::shared() const {
+  return static_cast<double>(distinct_) < kMostlyDistinct * static_cast<double>(size());
+}
+
+/// Before the first trial of a step, which is to F.
+void VolumeElements::relieve_ranks(std::span<const Tensor2> F) {
+  if (shares_.size() < 2 || shared() || statistics_.dem_steps == 0) return;
+  std::vector<std::string> inputs;
+  for (const auto& share : shares_) {
+    PacketWriter packet;
+    for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
+    inputs.push_back(packet.take());
+  }
+  const std::vector<std::string> answers = command(communicator_, Order::cost, inputs, local_);
+  std::vector<double> costs(size());
+  const auto trials = static_cast<double>(std::max(trials_of_last_step_, 1L));
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+    PacketReader packet(answers[rank]);
+    if (packet.get<std::size_t>() != shares_[rank].size()) return;
+    for (const std::size_t point : shares_[rank]) costs[point] = trials * packet.get<double>();
+  }
+  const double price = kMoveSteps * statistics_.cost / statistics_.dem_steps * local_.threads();
+  move_to(relieve(costs, owners(), static_cast<int>(shares_.size()), price));
+}
+
+/// Points go to these ranks; how many have moved.
+std::size_t VolumeElements::move_to(const std::vector<int>& owner) {
+  const std::vector<int> now = owners();
+  std::vector<std::size_t> moving;
+  for (std::size_t p = 0; p < size(); ++p)
+    if (owner[p] != now[p]) moving.push_back(p);
+  for (std::size_t first = 0; first < moving.size(); first += kMovedAtOnce)
+    move(std::span(moving).subspan(first, std::min(kMovedAtOnce, moving.size() - first)), owner);
+  statistics_.moved += static_cast<long>(moving.size());
+  return moving.size();
+}
+
 std::string describe(const Balance& balance, std::size_t points) {
   const std::string found = fmt::format(
-      "balance of the ranks since the last checkpoint: {:.3f} of ideal by counted cost, {:.3f} by the clock; {} of {} "
-      "points move",
-      balance.counted, balance.clocked, balance.moved, points);
-  if (balance.moved == 0) return found;
+      "balance of the ranks since the last checkpoint: {:.3f} of ideal by counted cost, {:.3f} by the clock, "
+      "{:.3f} with all that evaluations take besides; {} moves of {} points",
+      balance.counted, balance.clocked, balance.working, balance.moved, points);
+  if (balance.before == balance.after) return found;
   return found +
          fmt::format(", the busiest rank has {:.3f} instead of {:.3f} of the mean", balance.after, balance.before);
 }

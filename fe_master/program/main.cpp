@@ -103,7 +103,10 @@ int run_on_volume_elements(Problem& problem, RunOptions options) {
   options.ranks = mpi.size;
   const auto local = local_points(prepared.engine);
   VolumeElements points(MPI_COMM_WORLD, *local, prepared.states, pool.template_of_point);
-  if (mpi.size > 1) options.at_checkpoint = [&] { return describe(points.balance(ve.balance), points.size()); };
+  const bool each_step = ve.balance && prepared.engine == EngineKind::compact;
+  if (each_step) points.balance_each_step();
+  if (mpi.size > 1)
+    options.at_checkpoint = [&] { return describe(points.balance(ve.balance && !each_step), points.size()); };
   options.complete = [&](Summary& summary) {
     const VolumeElements::Account account = points.account();
     const FarmStatistics& statistics = points.statistics();

@@ -97,8 +97,14 @@ Response PathLengthPoints::respond(std::size_t index, const Tensor2& F, Operator
   const Tensor2 I = Tensor2::Identity();
   response.stress = rotate(Tensor2(state.modulus * (U - I) + 0.1 * state.modulus * state.length * I), R);
   if (wanted == Operator::elastic) response.stiffness = rotate(isotropic_stiffness(0, state.modulus / 2), R);
-  response.report["dem_steps"] = 7 * std::max(1.0, state.modulus / 1e8);
+  response.report["dem_steps"] = steps_of(state);
   return response;
+}
+
+std::vector<double> PathLengthPoints::costs(std::span<const Tensor2>) const {
+  std::vector<double> costs;
+  for (const State& state : committed_) costs.push_back(trial_cost(steps_of(state), 0));
+  return costs;
 }
 
 std::string PathLengthPoints::save_one(std::size_t index) {

@@ -18,6 +18,7 @@ class PathLengthPoints : public LocalPoints {
   std::string save_one(std::size_t index) override;
   std::uint64_t peak_memory() const override { return 1000 + size(); }
   std::size_t size() const override { return committed_.size(); }
+  std::vector<double> costs(std::span<const Tensor2> F) const override;
   std::vector<Response> evaluate(std::span<const Tensor2> F, Operator wanted) override;
   void commit() override { committed_ = trial_; }
   void save_each(const TakeState& take) override;
@@ -33,6 +34,7 @@ class PathLengthPoints : public LocalPoints {
     std::array<double, 9> U{1, 0, 0, 0, 1, 0, 0, 0, 1};
   };
   static State state_of(const std::string& bytes);
+  static double steps_of(const State& state) { return 7 * std::max(1.0, state.modulus / 1e8); }
   Response respond(std::size_t index, const Tensor2& F, Operator wanted);
 
   std::vector<State> committed_;

@@ -122,6 +122,29 @@ TEST(VolumeElements, PointsMoveToIdleRanksAndTheBitsStay) {
   EXPECT_EQ(balances[3], balances[2]);
 }
 
+TEST(VolumeElements, PointsMoveBeforeAStepWhoseCostsAreKnownAndTheBitsStay) {
+  const std::vector<int> points = heavy_on_rank_0(40);
+  Farm farm(Law::path_length, kTemplates, points);
+  farm.points->balance_each_step();
+  PathLengthPoints reference = in_one_place(points);
+  const auto F = distinct_gradients(points.size(), 1e-2);
+  std::vector<long> moved;
+  for (const double fraction : {0.3, 0.6, 0.9, 1.2}) {
+    farm.points->begin_step();
+    for (int trials = 0; trials < 20; ++trials) farm.points->evaluate(part(F, fraction), Operator::none);
+    expect_same_bits(trial(*farm.points, part(F, fraction)), trial(reference, part(F, fraction)));
+    farm.points->commit();
+    reference.commit();
+    EXPECT_EQ(farm.points->save(), reference.save());
+    moved.push_back(farm.points->statistics().moved);
+    const Balance balance = farm.points->balance(false);
+    if (ranks() == 1) continue;
+    EXPECT_EQ(balance.counted > 1 / 1.15, fraction > 0.3) << "nothing is known before the first step";
+  }
+  EXPECT_EQ(moved[0] > 0, ranks() > 1) << "the trial that is compared starts a second step";
+  EXPECT_EQ(moved[3], moved[1]) << "costs stay as they are, so do the points";
+}
+
 TEST(VolumeElements, PointsStayWhereMovingCostsMoreThanItSavesAndWhereTheyShareHistories) {
   const std::vector<int> points = heavy_on_rank_0(40);
   Farm farm(Law::path_length, kTemplates, points);

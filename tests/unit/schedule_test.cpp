@@ -121,6 +121,29 @@ TEST(Schedule, CostsThatDoNotTellThoseToComeMoveNothing) {
   EXPECT_EQ(rebalance(std::vector<double>(4, 0.0), latest, owner, 2, 0), owner) << "nothing is known yet";
 }
 
+TEST(Schedule, RelievesTheBusiestRankByThePointThatLeavesLeast) {
+  const std::vector<double> costs = {8, 4, 3, 1, 2};
+  const std::vector<int> owner = {0, 0, 0, 0, 1};  // 16 | 2: 3 leaves 13, 4 leaves 12, 8 leaves 10 for the other
+  EXPECT_EQ(relieve(costs, owner, 2, 0), (std::vector<int>{1, 0, 0, 0, 1}));
+  EXPECT_EQ(relieve(costs, owner, 2, 5.9), (std::vector<int>{1, 0, 0, 0, 1}));
+  EXPECT_EQ(relieve(costs, owner, 2, 6), owner) << "10 and the price is what it had";
+  EXPECT_EQ(moves(owner, std::vector<int>{1, 1, 0, 0, 1}, 2), (std::vector<double>{2, 2}));
+  EXPECT_EQ(relieve(costs, std::vector<int>(5, 0), 1, 0), std::vector<int>(5, 0));
+  EXPECT_EQ(relieve(std::vector<double>(5, 0.0), owner, 2, 0), owner);
+}
+
+TEST(Schedule, RelievesRanksOfARecordedBandAsFarAsThePriceAllows) {
+  std::vector<double> costs;  // every tenth point costs eight times the rest, dealt in turn to 64 ranks
+  std::mt19937 generator(1);
+  for (int p = 0; p < 64 * 20; ++p) costs.push_back((generator() % 10 == 0 ? 80 : 10) + generator() % 5);
+  const std::vector<int> owner = assign(costs.size(), 64);
+  const auto after = [&](double price) { return imbalance(loads(costs, relieve(costs, owner, 64, price), 64)); };
+  EXPECT_GT(imbalance(loads(costs, owner, 64)), 1.5);
+  EXPECT_LT(after(0), 1.06);
+  EXPECT_LT(after(20), after(60));
+  EXPECT_EQ(after(1e4), imbalance(loads(costs, owner, 64)));
+}
+
 // 5 5 | 3 3: no single point of the first rank fits into the second below 8, 5 3 | 5 3 does.
 TEST(Schedule, StartsAnewWhereNoPointFits) {
   const std::vector<double> costs = {5, 5, 3, 3};

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -28,13 +29,16 @@ std::vector<double> read(const std::string& file) {
 
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
-/// Time of the busiest rank, whose threads take its points longest first.
-double busiest(std::span<const double> costs, const std::vector<int>& owner, int ranks, int threads) {
+/// Time of the busiest rank, whose threads take its points longest first, after it has moved as many, each at a price.
+double busiest(std::span<const double> costs, const std::vector<int>& owner, int ranks, int threads,
+               const std::vector<double>& moved = {}, double price = 0) {
   std::vector<std::vector<double>> share(static_cast<std::size_t>(ranks));
   for (std::size_t p = 0; p < costs.size(); ++p) share[static_cast<std::size_t>(owner[p])].push_back(costs[p]);
   double most = 0;
-  for (const std::vector<double>& mine : share)
-    most = std::max(most, largest(loads(mine, assign(mine, threads), threads)));
+  for (std::size_t rank = 0; rank < share.size(); ++rank) {
+    const double moving = moved.empty() ? 0 : price * moved[rank];
+    most = std::max(most, moving + largest(loads(share[rank], assign(share[rank], threads), threads)));
+  }
   return most;
 }
 
@@ -66,7 +70,22 @@ Policy balanced(const std::vector<double>& costs, std::size_t points, Machine ma
   return policy;
 }
 
-/// Longest first by the costs of each batch itself, which nobody knows beforehand.
+/// As VolumeElements::balance_each_step; a batch is a step, and what moves before it is in its time.
+Policy each_step(const std::vector<double>& costs, std::size_t points, Machine machine, double price) {
+  Policy policy;
+  std::vector<int> owner = assign(points, machine.ranks);
+  for (std::size_t batch = 0; (batch + 1) * points <= costs.size(); ++batch) {
+    const std::span<const double> now(costs.data() + batch * points, points);
+    const std::vector<int> next = batch == 0 ? owner : relieve(now, owner, machine.ranks, price * machine.threads);
+    const std::vector<double> moved = moves(owner, next, machine.ranks);
+    policy.moved += static_cast<std::size_t>(std::accumulate(moved.begin(), moved.end(), 0.0)) / 2;
+    owner = next;
+    policy.busiest.push_back(busiest(now, owner, machine.ranks, machine.threads, moved, price));
+  }
+  return policy;
+}
+
+/// Longest first by the costs of each batch itself, were moving free.
 Policy foreseen(const std::vector<double>& costs, std::size_t points, Machine machine) {
   Policy policy;
   for (std::size_t batch = 0; (batch + 1) * points <= costs.size(); ++batch) {
@@ -101,6 +120,7 @@ int main(int argc, char** argv) {
     fmt::print("{{\n");
     print("static", balanced(costs, points, machine, 0, price), ",");
     print("balanced", balanced(costs, points, machine, window, price), ",");
+    print("each_step", each_step(costs, points, machine, price), ",");
     print("foreseen", foreseen(costs, points, machine), "");
     fmt::print("}}\n");
   } catch (const std::exception& error) {
