@@ -2,6 +2,7 @@
 # Builds, tests and shows femxdem on Debian 12. Run `bash setup.sh` for what it can do.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
+export HOME=${HOME:-/tmp}  # YADE reads it; a container that is being made has none
 
 readonly BUILD=build/release
 readonly PYTHON=/usr/bin/python3  # the one that Debian's YADE is built for, whatever comes first on PATH

@@ -2,10 +2,11 @@
 
     validation/faults/soak.py [--minutes 30] [--femxdem PROGRAM] [--runs FOLDER]
 
-One run in YADE's engine goes on and on, its trials killed by SIGSEGV or SIGKILL; beside it runs on a closed-form law are killed
-within a write and started again. Says one line a minute, and at the end the slope of the memory of the long run's rank and worker
-(least squares over its samples, from the third step on), zombies below it, and what is new in /dev/shm, the temporary folder and
-the results. Status 1 where something is left.
+One run in YADE's engine goes on and on, its trials killed by SIGSEGV or SIGKILL; a trial that has become the committed state in the
+moment of its kill was the worker, and the run ends with status 4: it goes on from its checkpoint. Beside it runs on a closed-form law are
+killed within a write and started again. Says one line a minute, and at the end the slope of the memory of the long run's rank and worker
+(least squares over the samples since its last start but the first five steps), zombies below it, and what is new in /dev/shm, the temporary folder and
+the results. Fields are written every hundred steps: HDF5 keeps up to some 40 MB of an open file's index. Status 1 where something is left.
 """
 
 import random
@@ -60,14 +61,17 @@ class LongRun:
     """A run of volume elements in YADE that ends only when it is told to."""
 
     def __init__(self, place):
-        self.folder = place.work / "long"
-        fault = injections.Fault("long", "yade", settings=("control.end_time=20", "control.step=1e-4", "control.max_step=1e-4"))
+        self.place, self.folder = place, place.work / "long"
         self.said = open(place.work / "long.txt", "w")
-        self.process = subprocess.Popen(place.command(fault, self.folder, ["--overwrite"]), env=place.environment,
-                                        stdout=self.said, stderr=self.said)
-        injections.wait_for(self.process, lambda: len(injections.history(self.folder)) >= 3, 600)
+        self.killed, self.struck, self.zombies, self.restarts, self.started = 0, 0, 0, 0, time.monotonic()
+        self.start("--overwrite", 0)
+
+    def start(self, existing, done):
+        settings = ("control.end_time=20", "control.step=1e-4", "control.max_step=1e-4", "output.every=100")
+        command = self.place.command(injections.Fault("long", "yade", settings=settings), self.folder, [existing])
+        self.process = subprocess.Popen(command, env=self.place.environment, stdout=self.said, stderr=self.said)
+        injections.wait_for(self.process, lambda: len(injections.history(self.folder)) >= done + 5, 600)
         self.samples = {"rank": [], "worker": []}
-        self.killed, self.struck, self.zombies, self.started = 0, 0, 0, time.monotonic()
 
     def strike(self, rng):
         """Once a step: two kills of one trial are a failed point, and a busy machine takes long for a trial."""
@@ -81,6 +85,10 @@ class LongRun:
 
     def sample(self):
         now = time.monotonic() - self.started
+        if self.process.poll() == 4 and "it ended by itself" in Path(self.said.name).read_text().splitlines()[-1]:
+            self.restarts += 1
+            self.struck = len(injections.history(self.folder))
+            self.start("--restart", self.struck)
         if self.process.poll() is not None:
             raise SystemExit(f"{self.folder}: the long run has ended with status {self.process.returncode}, see {self.said.name}")
         workers = injections.workers(self.process)
@@ -118,9 +126,9 @@ def work(c, minutes):
     slopes = {name: slope(samples) for name, samples in long.samples.items()}
     new = sorted(temporary() - before)
     strays = injections.strays(place.work / "struck")
-    lines = ["| minutes | trials killed | steps of the long run | runs struck | wrong | memory of rank, worker [MB/min] | zombies | processes left | new in /dev/shm and temporary folder | strays beside results |",
-             "|---|---|---|---|---|---|---|---|---|---|",
-             f"| {minutes:g} | {long.killed} | {steps} | {runs} | {wrong} | {slopes['rank']:.2f}, {slopes['worker']:.2f} | {long.zombies} | {len(left)} | {len(new)} | {len(strays)} |"]
+    lines = ["| minutes | trials killed | of which had become the worker: restarts | steps of the long run | runs struck | wrong | memory of rank, worker [MB/min] | zombies | processes left | new in /dev/shm and temporary folder | strays beside results |",
+             "|---|---|---|---|---|---|---|---|---|---|---|",
+             f"| {minutes:g} | {long.killed} | {long.restarts} | {steps} | {runs} | {wrong} | {slopes['rank']:.2f}, {slopes['worker']:.2f} | {long.zombies} | {len(left)} | {len(new)} | {len(strays)} |"]
     print("\n".join(lines), new, strays, sep="\n")
     c.table(lines, mark="soak")
     return 0 if alive and not (wrong or left or new or strays or long.zombies) and max(slopes.values()) < MOST else 1
