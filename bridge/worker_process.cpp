@@ -184,8 +184,13 @@ std::uint32_t WorkerProcess::send(Command command, std::int64_t a, std::int64_t 
   const std::int64_t size = mail.empty() ? 0 : put_mail(mail_descriptor_, mail);
   const Message message{command, ++sent_, a, b, size};
   if (::send(socket_, &message, sizeof message, MSG_NOSIGNAL) != sizeof message)
-    throw WorkerLost(fmt::format("worker (process {}): it does not take commands any more", pid_));
+    throw WorkerLost(lost("it does not take commands any more"));
   return sent_;
+}
+
+std::string WorkerProcess::lost(const char* how) const {
+  return fmt::format("worker (process {}): {}, its volume elements are lost; restart from the last checkpoint", pid_,
+                     how);
 }
 
 Reply WorkerProcess::receive(std::uint32_t number, Command command, double timeout) {
@@ -205,11 +210,7 @@ Reply WorkerProcess::receive(std::uint32_t number, Command command, double timeo
     Reply reply;
     const ssize_t size = recv(socket_, &reply, sizeof reply, 0);
     if (size < 0 && errno == EINTR) continue;
-    if (size != sizeof reply)
-      throw WorkerLost(
-          fmt::format("worker (process {}): it ended by itself, its volume elements are lost; "
-                      "restart from the last checkpoint",
-                      pid_));
+    if (size != sizeof reply) throw WorkerLost(lost("it ended by itself"));
     if (reply.number == number) return reply;
     // the trial may have taken the commit from the socket and died before it answered: nobody will
     if (command == Command::commit && reply.kind == ReplyKind::child_died)

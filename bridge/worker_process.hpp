@@ -73,6 +73,7 @@ class WorkerProcess {
   std::uint32_t send(Command command, std::int64_t a, std::int64_t b, std::string_view mail);
   Reply receive(std::uint32_t number, Command command, double timeout);
   void end_what_is_late(bool reported_nothing);
+  std::string lost(const char* how) const;
   void reap();
   void end();
 

@@ -8,9 +8,9 @@ namespace femxdem {
 namespace {
 
 const std::map<VePreset, Preset> kPresets = {
-    {VePreset::fast, {"fast", 100, 2e-2, 10, 2e-3, 1e-2, 4, 0.082, 0.11, 0.28, 0.095}},
-    {VePreset::balanced, {"balanced", 400, 2e-2, 3, 1e-3, 5e-3, 6, 0.05, 0.069, 0.3, 0.054}},
-    {VePreset::accurate, {"accurate", 1000, 2e-2, 3, 2.5e-4, 5e-3, 8, 0.043, 0.065, 0.14, 0.053}}};
+    {VePreset::fast, {"fast", 100, 2e-2, 10, 2e-3, 1e-2, 4, 0.082, 0.10, 0.21, 0.09}},
+    {VePreset::balanced, {"balanced", 400, 2e-2, 3, 1e-3, 5e-3, 6, 0.055, 0.079, 0.29, 0.058}},
+    {VePreset::accurate, {"accurate", 1000, 1e-2, 3, 5e-4, 5e-3, 8, 0.032, 0.023, 0.045, 0.033}}};
 
 /// Largest displacement in a second [m/s]: of value x factor of a load of that kind.
 double fastest(const Load& load, double end_time) {

@@ -99,9 +99,16 @@ def mean_path(paths):
     return replace(paths[0], strain=at, stress=mean)
 
 
-def rate_for(error, paths):
-    """The largest inertial number whose curve is within `error` of that of every lower one; {I: Path}."""
-    good = [i for i, p in paths.items() if all(distance(p, q) <= error for j, q in paths.items() if j < i)]
+def beyond(off, noise, points):
+    """What a setting moves the curve of a body of that many strained points by, of what it moves that of a single volume element
+    by, `off`, and what any small change does, `noise`: the one is the same in all points, the other averages out."""
+    return math.sqrt(max(off**2 - noise**2, 0.0) + noise**2 / points)
+
+
+def rate_for(error, paths, noise=0.0, points=1):
+    """The largest inertial number whose curve is within `error` of that of every lower one, see beyond(); {I: Path}."""
+    off = lambda p, q: beyond(distance(p, q), noise, points)
+    good = [i for i, p in paths.items() if all(off(p, q) <= error for j, q in paths.items() if j < i)]
     return max(good)
 
 

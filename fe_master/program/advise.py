@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from advice import (
-    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, band_thickness, cost_of_run, distance, elastic_until,
+    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, band_thickness, beyond, cost_of_run, distance, elastic_until,
     loading_path, mean_path, modulus_for, path_of, rate_for, scatter, scatter_constant, softening, spheres_for,
     stops_rising, strained_share, toml_value, tolerance_for, with_values,
 )
@@ -135,15 +135,19 @@ def advise(case, file, program, folder, error, band, points):
     packings = say_spheres(said, probes, error, spheres, ve["source"] == "prepare")
     compared = lambda name, **changes: mean_path([probes.run(f"{name}_{k}", **p, **changes) for k, p in enumerate(packings)])
     usual = compared("usual")
-    limit = max(0.4 * error, say_time_step(said, compared, usual, base, manifest, ve))
-    rate = say_rate(said, compared, usual, limit, ve["inertial_number"])
-    factor = say_increment(said, compared, usual, limit, case)
+    strained = max(1.0, points * share_strained(case))
+    noise = say_time_step(said, compared, usual, base, manifest, ve, strained)
+    off = lambda one, other: beyond(distance(one, other), noise, strained)
+    limit = max(0.4 * error, noise / strained**0.5)
+    rate = say_rate(said, compared, usual, limit, ve["inertial_number"], noise, strained)
+    factor = say_increment(said, compared, usual, limit, case, off)
     tolerance, of_tolerance = tolerance_for(max(error / 2, 0.0025))
     given = case.get("solver", {}).get("tolerance", 5e-3)
+    said.numbers["tolerance"] = of_tolerance
     said.say("tolerance", f"solver.tolerance = {tolerance:g} errs by {percent(of_tolerance)} (this case: {given:g})",
              solver__tolerance=tolerance)
     say_softening(said, case, base, band, ve)
-    say_not_needed(said, compared, usual, base, ve, limit, probes.engine)
+    say_not_needed(said, compared, usual, base, ve, limit, probes.engine, off)
     if points:
         own = predicted(base, case, points, spheres, ve["inertial_number"], given, ve["min_steps"], engine)
         say_cost(said, "as it is", own, points)
@@ -175,34 +179,37 @@ def say_spheres(said, probes, error, spheres, prepared):
     return made[SIZES[-1]]
 
 
-def say_rate(said, compared, usual, limit, own):
+def say_rate(said, compared, usual, limit, own, noise, strained):
     """Says the rate; the inertial number that it advises."""
     paths = {i: usual if i == own else compared(f"rate_{i:g}", inertial_number=i) for i in sorted({own, *RATES}, reverse=True)}
-    rate, slowest = rate_for(limit, paths), min(paths)
-    measured = ", ".join(f"{percent(distance(p, paths[slowest]))} at {i:g}" for i, p in paths.items() if i != slowest)
+    rate, slowest = rate_for(limit, paths, noise, strained), min(paths)
+    off = said.numbers["rate"] = {f"{i:g}": beyond(distance(p, paths[slowest]), noise, strained) for i, p in paths.items() if i != slowest}
+    measured = ", ".join(f"{percent(e)} at {i}" for i, e in off.items())
     said.say("rate", f"ve.inertial_number = {rate:g}: against {slowest:g} the curve is off by {measured}; {percent(limit)} is what "
              "the error allows, or what cannot be told apart", ve__inertial_number=rate)
     return rate
 
 
-def say_time_step(said, compared, usual, base, manifest, ve):
-    """Says the time step; what half of it moves the curve by: a stable one is exact enough, so that this is how far grains go
-    other ways for no reason, and nothing smaller can be told of other settings."""
+def say_time_step(said, compared, usual, base, manifest, ve, strained):
+    """Says the time step; what half of it moves the curve of a single volume element by: a stable one is exact enough, so that this
+    is how far grains go other ways for no reason, which the strained points of a body average out."""
     safety = ve["time_step_safety"]
     text = f"{manifest['time_step']:.3g} s, from {manifest['time_step_from']}"
     if "contact network" in manifest["time_step_from"]:
         text += f": {safety:g} of the critical {manifest['time_step'] / safety:.3g} s"
     finer = compared("half_the_time_step", time_step_safety=safety / 2)
     moved = distance(usual, finer)
-    said.say("time step", f"{text}; half of it moves the curve by {percent(moved)}, as any small change does; largest "
-             f"unbalanced force {base.unbalanced:.1e}, limit {ve['max_unbalanced_force']:g}")
+    said.numbers["time_step"] = beyond(moved, moved, strained)
+    said.say("time step", f"{text}; half of it moves the curve of one volume element by {percent(moved)}, as any small change does, that of "
+             f"{strained:.0f} strained points by {percent(said.numbers['time_step'])}; largest unbalanced force {base.unbalanced:.1e}, limit {ve['max_unbalanced_force']:g}")
     return moved
 
 
-def say_increment(said, compared, usual, limit, case):
+def say_increment(said, compared, usual, limit, case, off_by):
     """Says the increment; its size over the case's."""
     finer, coarser = compared("half_the_increment", coarser=0.5), compared("twice_the_increment", coarser=2)
-    off = {1: distance(usual, finer), 2: distance(coarser, finer)}
+    off = {1: off_by(usual, finer), 2: off_by(coarser, finer)}
+    said.numbers["increment"] = off[2]
     factor = 2 if off[2] <= limit else 1
     own = case.get("control", {}).get("max_step", case.get("control", {}).get("step"))
     values = {"control__step": factor * own, "control__max_step": factor * own} if own else {}
@@ -230,13 +237,13 @@ def say_softening(said, case, base, band, ve):
              f"{thickness / ELEMENTS_FOR_FORCE:.2g} m for the force, {thickness / ELEMENTS_FOR_WIDTH:.2g} m for the thickness", **values)
 
 
-def say_not_needed(said, compared, usual, base, ve, limit, engine):
+def say_not_needed(said, compared, usual, base, ve, limit, engine, off_by):
     if ve["source"] == "prepare" and ve["contact_law"] != "friction":
         if ve["cohesion"] == 0:
             said.say("not needed", "cohesion: ve.cohesion is 0, ve.contact_law = \"friction\" is the same and cheaper",
                      ve__contact_law="friction")
         else:
-            off = distance(compared("without_cohesion", contact_law="friction", cohesion=0.0), usual)
+            off = off_by(compared("without_cohesion", contact_law="friction", cohesion=0.0), usual)
             values = {"ve__contact_law": "friction", "ve__cohesion": 0.0} if off <= limit else {}
             said.say("not needed" if values else "needed", f"cohesion: without it the curve is off by {percent(off)}; "
                      f"{percent(base.adhesive)} of the contacts adhere at the end", **values)
@@ -244,16 +251,18 @@ def say_not_needed(said, compared, usual, base, ve, limit, engine):
     said.say("engine", engine)
 
 
+def share_strained(case):
+    """Of a body in which one band takes the strain; 1 where its mesh is no rectangle."""
+    mesh = case.get("mesh", {})
+    if mesh.get("type", "rectangle") != "rectangle" or "height" not in mesh:
+        return 1.0
+    D, sigma_0 = case.get("element", {}).get("D"), case.get("ve", {}).get("confining_stress", 1e5)
+    return strained_share(band_thickness(D, sigma_0) if D else 1.5 * mesh["height"] / mesh["ny"], mesh["height"])
+
+
 def predicted(path, case, points, spheres, rate, tolerance, min_steps, engine, larger=1.0):
     """Cost of the run of `case`; larger: spheres of the run over those of the Path."""
-    strained = 1.0
-    if case.get("mesh", {}).get("type", "rectangle") == "rectangle" and "height" in case.get("mesh", {}):
-        mesh = case["mesh"]
-        D = case.get("element", {}).get("D")
-        sigma_0 = case.get("ve", {}).get("confining_stress", 1e5)
-        width = band_thickness(D, sigma_0) if D else 1.5 * mesh["height"] / mesh["ny"]
-        strained = strained_share(width, mesh["height"])
-    return cost_of_run(path, points, spheres, rate, tolerance, min_steps, strained, larger * path.step_seconds, engine == "compact")
+    return cost_of_run(path, points, spheres, rate, tolerance, min_steps, share_strained(case), larger * path.step_seconds, engine == "compact")
 
 
 def say_cost(said, name, cost, points):

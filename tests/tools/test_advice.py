@@ -45,6 +45,12 @@ class Curves(unittest.TestCase):
         self.assertEqual(advice.rate_for(0.1, paths), 2e-2)
         self.assertEqual(advice.rate_for(0.01, paths), 5e-3)
 
+    def test_what_any_small_change_does_averages_out_over_points(self):
+        self.assertAlmostEqual(advice.beyond(0.05, 0.04, 1e9), 0.03)
+        self.assertAlmostEqual(advice.beyond(0.03, 0.04, 16), 0.01)
+        self.assertAlmostEqual(advice.beyond(0.04, 0.04, 1), 0.04)
+        self.assertAlmostEqual(advice.beyond(0.05, 0.0, 1), 0.05)
+
     def test_peak_and_fall(self):
         strain, fall = advice.softening(path(peaked()))
         self.assertAlmostEqual(strain, 0.02, delta=0.002)

@@ -85,7 +85,7 @@ class LongRun:
 
     def sample(self):
         now = time.monotonic() - self.started
-        if self.process.poll() == 4 and "it ended by itself" in Path(self.said.name).read_text().splitlines()[-1]:
+        if self.process.poll() == 4 and "its volume elements are lost" in Path(self.said.name).read_text().splitlines()[-1]:
             self.restarts += 1
             self.struck = len(injections.history(self.folder))
             self.start("--restart", self.struck)

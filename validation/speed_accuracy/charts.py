@@ -168,19 +168,19 @@ def root_mean_square(values):
 
 
 class Found:
-    """The runs of one chart: readings and costs by (setting, packing)."""
+    """The runs of one chart: readings and costs by (setting, packing). `specimens`: as SPECIMENS, of a chart with its own."""
 
-    def __init__(self, c, name):
-        self.c, self.name, self.chart = c, name, CHARTS[name]
+    def __init__(self, c, name, chart, specimens=SPECIMENS):
+        self.c, self.name, self.chart, self.specimens = c, name, chart, specimens
         self.readings, self.costs, self.ended = {}, {}, {}
 
     def run(self, setting, packing):
-        case, usual = SPECIMENS[setting.material]
+        case, usual = self.specimens[setting.material]
         settings = (*usual, *setting.settings)
         if packing is not None:
             settings = (*settings, f"ve.seed={packing}", self.c.cache)
-            spheres = next((s for s in setting.settings if s.startswith("ve.spheres=")), "ve.spheres=200")
-            self.c.run(case, f"start/{spheres[11:]}_{packing}", *usual, spheres, f"ve.seed={packing}", self.c.cache, "control.end_time=0.02")
+            made = next((s for s in setting.settings if s.startswith(("ve.spheres=", "ve.preset="))), "ve.spheres=200")
+            self.c.run(case, f"start/{made.partition('=')[2]}_{packing}", *usual, made, f"ve.seed={packing}", self.c.cache, "control.end_time=0.02")
         word = setting.name.replace(", ", "_").replace(" ", "_")
         run = self.c.run(case, f"{self.name}/{setting.material}/{word}_{packing}", *settings)
         key = setting.name, setting.material, packing
@@ -275,21 +275,25 @@ def table(rows):
     return lines[1:]
 
 
-def write(c, name):
-    """Runs the chart of that name; its table and its numbers."""
-    found = Found(c, name)
+def measure(found):
+    """Runs a chart, writes its numbers; its rows."""
     for setting in found.chart.settings:
         for packing in setting.packings:
             found.run(setting, packing)
     rows = found.rows()
-    with open(c.product(f"{name}.csv"), "w", newline="") as stream:
+    with open(found.c.product(f"{found.name}.csv"), "w", newline="") as stream:
         writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
         writer.writerows(rows)
-    for material in found.chart.references:
-        mean = mean_of([r for key, r in found.readings.items() if key[:2] == (found.chart.references[material][0], material)])
-        print(f"{name}, {material}: reference peak {mean.peak:.3f}, residual {mean.residual:.3f}, band {mean.band:.3f} m")
-    lines = table(rows)
+    for material, (name, _) in found.chart.references.items():
+        mean = mean_of([r for key, r in found.readings.items() if key[:2] == (name, material)])
+        print(f"{found.name}, {material}: reference peak {mean.peak:.3f}, residual {mean.residual:.3f}, band {mean.band:.3f} m")
+    return rows
+
+
+def write(c, name):
+    """Runs the chart of that name; its table."""
+    lines = table(measure(Found(c, name, CHARTS[name])))
     print(*lines, sep="\n")
     c.table(lines, mark=name)
 

@@ -18,7 +18,7 @@ import presets
 import volume_elements
 
 ROWS = {"ve": "spheres, inertial number, time step of a single volume element", **{name: chart.text for name, chart in charts.CHARTS.items()},
-        "presets": "errors of ve.preset, from the charts"}
+        "presets": "ve.preset as it is: its errors in whole runs"}
 
 
 def work(c, names):
