@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from advice import (
-    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, band_thickness, beyond, cost_of_run, distance, elastic_until,
+    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, Differences, band_thickness, cost_of_run, elastic_until,
     loading_path, mean_path, modulus_for, path_of, rate_for, scatter, scatter_constant, softening, spheres_for,
     stops_rising, strained_share, toml_value, tolerance_for, with_values,
 )
@@ -136,10 +136,9 @@ def advise(case, file, program, folder, error, band, points):
     compared = lambda name, **changes: mean_path([probes.run(f"{name}_{k}", **p, **changes) for k, p in enumerate(packings)])
     usual = compared("usual")
     strained = max(1.0, points * share_strained(case))
-    noise = say_time_step(said, compared, usual, base, manifest, ve, strained)
-    off = lambda one, other: beyond(distance(one, other), noise, strained)
-    limit = max(0.4 * error, noise / strained**0.5)
-    rate = say_rate(said, compared, usual, limit, ve["inertial_number"], noise, strained)
+    off = say_time_step(said, compared, usual, base, manifest, ve, strained)
+    limit = max(0.4 * error, off.noise[0] / strained**0.5)
+    rate = say_rate(said, compared, usual, limit, ve["inertial_number"], off)
     factor = say_increment(said, compared, usual, limit, case, off)
     tolerance, of_tolerance = tolerance_for(max(error / 2, 0.0025))
     given = case.get("solver", {}).get("tolerance", 5e-3)
@@ -179,11 +178,11 @@ def say_spheres(said, probes, error, spheres, prepared):
     return made[SIZES[-1]]
 
 
-def say_rate(said, compared, usual, limit, own, noise, strained):
+def say_rate(said, compared, usual, limit, own, off_by):
     """Says the rate; the inertial number that it advises."""
     paths = {i: usual if i == own else compared(f"rate_{i:g}", inertial_number=i) for i in sorted({own, *RATES}, reverse=True)}
-    rate, slowest = rate_for(limit, paths, noise, strained), min(paths)
-    off = said.numbers["rate"] = {f"{i:g}": beyond(distance(p, paths[slowest]), noise, strained) for i, p in paths.items() if i != slowest}
+    rate, slowest = rate_for(limit, paths, off_by), min(paths)
+    off = said.numbers["rate"] = {f"{i:g}": off_by(p, paths[slowest]) for i, p in paths.items() if i != slowest}
     measured = ", ".join(f"{percent(e)} at {i}" for i, e in off.items())
     said.say("rate", f"ve.inertial_number = {rate:g}: against {slowest:g} the curve is off by {measured}; {percent(limit)} is what "
              "the error allows, or what cannot be told apart", ve__inertial_number=rate)
@@ -191,18 +190,18 @@ def say_rate(said, compared, usual, limit, own, noise, strained):
 
 
 def say_time_step(said, compared, usual, base, manifest, ve, strained):
-    """Says the time step; what half of it moves the curve of a single volume element by: a stable one is exact enough, so that this
-    is how far grains go other ways for no reason, which the strained points of a body average out."""
+    """Says the time step; the Differences that half of it tells: a stable one is exact enough, so that what it moves is how far grains
+    go other ways for no reason, which the strained points of a body average out."""
     safety = ve["time_step_safety"]
     text = f"{manifest['time_step']:.3g} s, from {manifest['time_step_from']}"
     if "contact network" in manifest["time_step_from"]:
         text += f": {safety:g} of the critical {manifest['time_step'] / safety:.3g} s"
     finer = compared("half_the_time_step", time_step_safety=safety / 2)
-    moved = distance(usual, finer)
-    said.numbers["time_step"] = beyond(moved, moved, strained)
-    said.say("time step", f"{text}; half of it moves the curve of one volume element by {percent(moved)}, as any small change does, that of "
+    off = Differences(usual, finer, strained)
+    said.numbers["time_step"] = off(usual, finer)
+    said.say("time step", f"{text}; half of it moves the curve of one volume element by {percent(off.noise[0])}, as any small change does, that of "
              f"{strained:.0f} strained points by {percent(said.numbers['time_step'])}; largest unbalanced force {base.unbalanced:.1e}, limit {ve['max_unbalanced_force']:g}")
-    return moved
+    return off
 
 
 def say_increment(said, compared, usual, limit, case, off_by):
