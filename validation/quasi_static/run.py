@@ -20,6 +20,9 @@ import element_rates
 import matplotlib.pyplot as plt
 import numpy as np
 
+from band import band_of_run
+from results import ResultsError
+
 CASE = HERE.parent / "solver" / "biaxial_ve.toml"
 HEIGHT, SIGMA_0, VELOCITY = 2.0, 1e5, 0.1
 NUMBERS = (2e-2, 5e-3, 2e-3, 1e-3, 5e-4)
@@ -88,6 +91,51 @@ def table(lines):
     return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *([name, *cells] for name, cells in lines))]
 
 
+def rates(runs):
+    """Lines of a table over the rate, of the runs by key that differ in it and in the packing alone: means of the packings and
+    their standard errors; a straight line through each packing's rates to zero."""
+    chosen = {k: r for k, r in runs.items() if k.answer == "mean" and k == Key(k.spheres, k.number, "mean", mesh=k.mesh, seed=k.seed)}
+    lines = ["| elements, spheres | | " + " | ".join(f"I = {i:g}" for i in NUMBERS) + " | to I = 0 |", "|" + "---|" * (len(NUMBERS) + 3)]
+    for mesh, spheres in sorted({(k.mesh, k.spheres) for k in chosen}):
+        by_rate = {i: {k.seed: r for k, r in chosen.items() if (k.mesh, k.spheres, k.number) == (mesh, spheres, i)} for i in NUMBERS}
+        if sum(len(found) > 1 for found in by_rate.values()) < 2:
+            continue
+        for what, of in READ.items():
+            values = {i: {seed: of(r) for seed, r in found.items()} for i, found in by_rate.items()}
+            cells = [mean_and_error(list(found.values())) for found in values.values()]
+            everywhere = set.intersection(*(set(v) for v in values.values() if v))
+            at = [i for i in NUMBERS if values[i]]
+            zero = [np.polyfit(at, [values[i][seed] for i in at], 1)[1] for seed in sorted(everywhere)]
+            lines.append(f"| {mesh}, {spheres} | {what} | " + " | ".join(cells) + f" | {mean_and_error(zero)} |")
+    return lines
+
+
+def mean_and_error(values):
+    values = [v for v in values if np.isfinite(v)]
+    if not values:
+        return ""
+    error = f" +- {np.std(values, ddof=1) / np.sqrt(len(values)):.3f}" if len(values) > 1 else ""
+    return f"{np.mean(values):.3f}{error}"
+
+
+def thickness(run):
+    try:
+        return band_of_run(run.folder).thickness
+    except ResultsError:
+        return float("nan")
+
+
+def at_strain(e):
+    def of(run):
+        strain, force = curve(run.history())
+        return float(np.interp(e, strain, force)) if strain[-1] >= e else float("nan")
+    return of
+
+
+READ = {"peak / sigma_0": lambda run: float(curve(run.history())[1].max()), "at 3 %": at_strain(0.03), "at 4.9 %": at_strain(0.049),
+        "band [m]": thickness}
+
+
 def draw(curves, file):
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8), sharey=True)
     for axis, spheres in zip(axes, (200, 1000)):
@@ -101,8 +149,8 @@ def draw(curves, file):
 
 
 def work(c, chosen, strain, as_they_are):
-    lines, curves = [], []
-    if YADE_ALONE in chosen:
+    lines, curves, runs = [], [], {}
+    if YADE_ALONE in chosen and not as_they_are:
         element_rates.write(c)
     for name in (n for n in chosen if n != YADE_ALONE):
         run = c.as_it_is(name) if as_they_are else c.run(CASE, name, *settings(ROWS[name], strain), c.cache, checkpoint_every=10)
@@ -110,9 +158,13 @@ def work(c, chosen, strain, as_they_are):
         if not cells:
             continue
         lines.append((name, cells))
+        runs[ROWS[name]] = run
         curves.append((ROWS[name], run.history()))
         print(table(lines[-1:])[-1], flush=True)
         c.table(table(lines))
+    if len(over_rates := rates(runs)) > 2:
+        print(*over_rates, sep="\n")
+        c.table(over_rates, mark="rates")
     if curves:
         draw(curves, c.product("quasi_static.png"))
 
