@@ -203,8 +203,9 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
                 "one trial of compact cells in so many is repeated in YADE; 0: about 20 in a run"),
       parameter("threads", &V::threads, "", kNotNegative,
                 "of a rank, for compact cells; 0: the processors that it may use"),
-      parameter("balance", &V::balance, "", kAny,
-                "volume elements move to other ranks where that pays: compact cells before a step, those of YADE at checkpoints"),
+      parameter(
+          "balance", &V::balance, "", kAny,
+          "volume elements move to other ranks where it pays: compact cells before a step, others at checkpoints"),
       parameter("sorted_contacts", &V::sorted_contacts, "", kAny,
                 "YADE sums forces in the order of compact cells, in three times the time: to compare bits"),
       word("snapshot", &V::snapshot, {"fork", "serialise"}, "how a trial of YADE leaves the committed state alone"),

@@ -22,7 +22,7 @@ TOLERANCES = ((1e-2, 0.014), (5e-3, 0.005), (1e-3, 0.0025))
 BEFORE, PAST = (1.9, 0.08, 0.25, 0.33), (2.4, 0.20, 0.35, 0.27)
 BYTES_A_SPHERE = 2700.0  # of a point in compact cells: committed state, spare ones, contacts that grew (validation/biaxial, 128)
 BYTES_A_SPHERE_YADE = 10_000.0  # of a volume element in YADE with its trial (validation/engine)
-BYTES_OF_PROGRAM = 1.0e8
+BYTES_OF_PROGRAM = 1.0e8  # and as much for YADE in its worker (validation/advise)
 # Processor time of an evaluation on rank 0, for each element (assembly, learned tangents, solution; 32 to 512 elements of the
 # second gradient), and of a run's start (YADE's import, comparison of the engines, repeated trials): validation/advise.
 SERIAL_SECONDS, START_SECONDS = 4e-4, 2.5
@@ -208,7 +208,7 @@ def cost_of_run(path, points, spheres, inertial_number, tolerance, min_steps, st
     number, trial = number[1:], trial[1:]  # the first row is the start
     steps = float(points * (number * trial).sum())
     a_sphere = BYTES_A_SPHERE if compact else BYTES_A_SPHERE_YADE
-    memory = BYTES_OF_PROGRAM + points * spheres * a_sphere
+    memory = BYTES_OF_PROGRAM * (1 if compact else 2) + points * spheres * a_sphere
     serial = float(number.sum()) * SERIAL_SECONDS * points / POINTS_OF_AN_ELEMENT
     return Cost(float(number.sum()), steps, steps * step_seconds, serial, memory)
 
