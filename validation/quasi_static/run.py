@@ -103,9 +103,8 @@ def rates(runs):
         for what, of in READ.items():
             values = {i: {seed: of(r) for seed, r in found.items()} for i, found in by_rate.items()}
             cells = [mean_and_error(list(found.values())) for found in values.values()]
-            everywhere = set.intersection(*(set(v) for v in values.values() if v))
-            at = [i for i in NUMBERS if values[i]]
-            zero = [np.polyfit(at, [values[i][seed] for i in at], 1)[1] for seed in sorted(everywhere)]
+            of_seed = {seed: [i for i in NUMBERS if np.isfinite(values[i].get(seed, np.nan))] for seed in (1, 2, 3)}
+            zero = [np.polyfit(at, [values[i][seed] for i in at], 1)[1] for seed, at in of_seed.items() if len(at) > 2]
             lines.append(f"| {mesh}, {spheres} | {what} | " + " | ".join(cells) + f" | {mean_and_error(zero)} |")
     return lines
 
@@ -137,15 +136,20 @@ READ = {"peak / sigma_0": lambda run: float(curve(run.history())[1].max()), "at 
 
 
 def draw(curves, file):
-    figure, axes = plt.subplots(1, 2, figsize=(10, 3.8), sharey=True)
-    for axis, spheres in zip(axes, (200, 1000)):
-        for (key, history) in (c for c in curves if c[0].spheres == spheres):
+    """Colours: rates; a thin line for each packing; dashed: the end's stress; dotted: damping 0.7. Usual increments."""
+    figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), sharey=True)
+    for axis, (spheres, mesh) in zip(axes, ((200, "4x8"), (1000, "4x8"), (1000, "8x16"))):
+        labelled = set()
+        for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment) == (spheres, mesh, "")):
             strain, force = curve(history)
-            axis.plot(100 * strain, force, label=key.name(), linewidth=0.9, linestyle="--" if key.answer == "end" else "-")
-        axis.set(xlabel="axial strain [%]", title=f"{spheres} spheres")
+            style = "--" if key.answer == "end" else ":" if key.damping != 0.2 else "-"
+            label = f"I = {key.number:g}, {key.answer}" + ", damping 0.7" * (style == ":")
+            axis.plot(100 * strain, force, style, color=f"C{NUMBERS.index(key.number)}", linewidth=0.8, label=None if label in labelled else label)
+            labelled.add(label)
+        axis.set(xlabel="axial strain [%]", title=f"{mesh} elements, {spheres} spheres")
         axis.legend(fontsize=6)
     axes[0].set(ylabel="force / (sigma_0 W)")
-    figure.savefig(file, dpi=100, bbox_inches="tight")
+    figure.savefig(file, dpi=90, bbox_inches="tight")
 
 
 def work(c, chosen, strain, as_they_are):
