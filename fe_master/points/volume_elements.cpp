@@ -31,6 +31,18 @@ std::vector<std::vector<std::size_t>> shares(const std::vector<int>& owner, int 
   return points;
 }
 
+/// Input of each rank: the same head, then the F of its points.
+std::vector<std::string> gradients(std::span<const Tensor2> F, const std::vector<std::vector<std::size_t>>& shares,
+                                   const std::string& head = {}) {
+  std::vector<std::string> inputs;
+  for (const auto& share : shares) {
+    PacketWriter packet;
+    for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
+    inputs.push_back(head + packet.take());
+  }
+  return inputs;
+}
+
 /// Of one trial; 0 where a law makes no steps.
 double cost(const PointReport& report) {
   const double steps = report["dem_steps"];
@@ -77,13 +89,9 @@ std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Opera
   const auto start = std::chrono::steady_clock::now();
   if (each_step_ && trials_of_step_ == 0) relieve_ranks(F);
   ++trials_of_step_;
-  std::vector<std::string> inputs;
-  for (const auto& share : shares_) {
-    PacketWriter packet;
-    packet.put(static_cast<int>(wanted));
-    for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
-    inputs.push_back(packet.take());
-  }
+  PacketWriter head;
+  head.put(static_cast<int>(wanted));
+  const std::vector<std::string> inputs = gradients(F, shares_, head.take());
   const std::vector<std::string> answers = command(communicator_, Order::evaluate, inputs, local_);
   std::vector<Response> responses(size());
   for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
@@ -249,13 +257,7 @@ bool VolumeElements::shared() const {
 /// Before the first trial of a step, which is to F.
 void VolumeElements::relieve_ranks(std::span<const Tensor2> F) {
   if (shares_.size() < 2 || shared() || statistics_.dem_steps == 0) return;
-  std::vector<std::string> inputs;
-  for (const auto& share : shares_) {
-    PacketWriter packet;
-    for (const std::size_t point : share) packet.put_doubles(F[point].data(), 9);
-    inputs.push_back(packet.take());
-  }
-  const std::vector<std::string> answers = command(communicator_, Order::cost, inputs, local_);
+  const std::vector<std::string> answers = command(communicator_, Order::cost, gradients(F, shares_), local_);
   std::vector<double> costs(size());
   const auto trials = static_cast<double>(std::max(trials_of_last_step_, 1L));
   for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
