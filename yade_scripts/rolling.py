@@ -1,4 +1,4 @@
-"""Rolling and twisting stiffness of contacts with moments, for the largest stable time step."""
+"""Contacts with moments: their rolling and twisting stiffness, for the largest stable time step, and a scene without them."""
 
 import numpy as np
 
@@ -20,10 +20,44 @@ def _acts(c):
     """(m,) whether a contact's law has moments: YADE fills kr and ktw of CohFrictPhys where momentRotationLaw is off too."""
     from yade.wrapper import Omega
 
-    loop = next(e for e in Omega().engines if type(e).__name__ == "InteractionLoop")
-    if any(getattr(law, "always_use_moment_law", False) for law in loop.lawDispatcher.functors):
+    if any(getattr(law, "always_use_moment_law", False) for law in _laws(Omega())):
         return np.full(len(c.phys), True)
     return np.array([getattr(p, "momentRotationLaw", True) for p in c.phys], dtype=bool)
+
+
+def _laws(O):
+    return [law for e in O.engines if type(e).__name__ == "InteractionLoop" for law in e.lawDispatcher.functors]
+
+
+def pass_moments(O):
+    """Whether a contact of the scene passes a moment that its rotation calls for."""
+    always = any(getattr(law, "always_use_moment_law", False) for law in _laws(O))
+    for i in O.interactions:
+        p = i.phys
+        if any(getattr(p, name, 0) > 0 for name in ("kr", "ktw", "mR")) and (always or getattr(p, "momentRotationLaw", True)):
+            return True
+    return False
+
+
+def take_moments(O):
+    """Contacts of the scene, those that form later too, pass no moments any more. Raises ValueError where their law has no switch
+    for them."""
+    for law in _laws(O):
+        _set(law, always_use_moment_law=False, includeMoment=False)
+    for b in O.bodies:
+        _set(b.mat, momentRotationLaw=False, mR=0.0)
+    for i in O.interactions:
+        zero = 0 * i.geom.normal
+        _set(i.phys, momentRotationLaw=False, kr=0.0, ktw=0.0, mR=0.0, moment_bending=zero, moment_twist=zero, momentBend=zero, momentTwist=zero)
+    if pass_moments(O):
+        laws = ", ".join(type(law).__name__ for law in _laws(O))
+        raise ValueError(f"ve.moments = false: the moments of {laws} cannot be taken away; write the script without them.")
+
+
+def _set(thing, **values):
+    for name, value in values.items():
+        if hasattr(thing, name):
+            setattr(thing, name, value)
 
 
 def moments(c, k, w):

@@ -21,13 +21,14 @@ import forces_at_rest
 import mean_stress
 import packing
 import probing
+import rolling
 import unit_of_time
 import user_scenes
 import viscosity
 import yade_modules
 from time_step import follow_network, set_time_step
 
-DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "scene_sha256": ""}  # of what a case leaves out
+DEFAULTS = {"arguments": (), "compare": continuation.FEW_STEPS, "scene_sha256": "", "moments": True}  # of what a case leaves out
 END_STRESS = ["end_stress_" + c for c in ("xx", "yy", "zz", "xy", "yz", "zx")]
 
 
@@ -81,6 +82,9 @@ class Engine:
         spec = {**DEFAULTS, **spec}
         notes, inputs = self._make_scene(spec)
         manifest = {"source": spec["source"], "notes": notes, "inputs": sorted(inputs.items())}
+        manifest["moments"] = rolling.pass_moments(self.O)
+        if manifest["moments"] and not spec["moments"]:
+            rolling.take_moments(self.O)
         adoption.finish_step(self.O)
         archive_check.refuse_lost_grains(self.O)
         left = archive_check.state(self.O) if self.O.periodic and self.O.interactions.countReal() else None

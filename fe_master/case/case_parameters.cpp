@@ -154,6 +154,8 @@ std::vector<Parameter<VeParameters>> packing_parameters() {
           parameter("script_memory", &V::script_memory, "GB", kPositive, "memory that the script may allocate"),
           parameter("script_output", &V::script_output, "MB", kPositive,
                     "what the script may print, and write into one file"),
+          parameter("moments", &V::moments, "", kAny,
+                    "false: contacts of a script or scene pass no moments (rolling and twisting resistance)"),
           parameter("spheres", &V::spheres, "", {20.0, 1e6}, "number of spheres"),
           parameter("size_ratio", &V::size_ratio, "", {1.0, 20.0}, "largest over smallest diameter"),
           parameter("kappa", &V::kappa, "", {1.0, 1e7}, "stiffness k_n / (sigma_0 a)"),

@@ -172,22 +172,46 @@ void load(LocalPoints& local, PacketReader input) {
   if (!points.empty()) local.load_into(points, input.get_text());
 }
 
-/// Input: places of points, ascending. Their states; the points are gone.
-std::string give(LocalPoints& local, PacketReader input) {
-  std::vector<std::size_t> places(input.get<std::size_t>());
-  PacketWriter output;
-  for (std::size_t& place : places) {
-    place = input.get<std::size_t>();
-    output.put(local.save_one(place));
+/// The answer of a rank: verdict, then the output or the text of the exception.
+template <class Task>
+std::string answer_of(Task task) {
+  const auto packed = [](Verdict verdict, std::string_view text) {
+    PacketWriter packet;
+    packet.put(static_cast<std::int32_t>(verdict));
+    packet.put(text);
+    return packet.take();
+  };
+  try {
+    return packed(Verdict::done, task());
+  } catch (const UserError& error) {
+    return packed(Verdict::user_error, error.what());
+  } catch (const std::exception& error) {
+    return packed(Verdict::error, error.what());
   }
-  for (auto place = places.rbegin(); place != places.rend(); ++place) local.remove(*place);
-  return output.take();
 }
 
-/// Input: states of further points.
-void take(LocalPoints& local, PacketReader input) {
-  const auto count = input.get<std::size_t>();
-  for (std::size_t i = 0; i < count; ++i) local.add(input.get_text(), 1);
+/// States from rank to rank, one after another. Input: this rank's part of all moves, which keep their order on every
+/// rank, so that none waits in a circle: the other rank, and the place of the point if it is given. A giver that fails
+/// tells its taker; who fails does so after its last move.
+void exchange(LocalPoints& local, PacketReader input, MPI_Comm communicator) {
+  const auto moves = input.get<std::size_t>();
+  std::exception_ptr failure;
+  for (std::size_t move = 0; move < moves; ++move) {
+    const int other = input.get<int>();
+    if (input.get<bool>()) {
+      const auto place = input.get<std::size_t>();
+      send(communicator, other, answer_of([&] { return local.save_one(place); }));
+      local.remove(place);
+      continue;
+    }
+    const std::vector<std::string> received{receive(communicator, other)};
+    try {
+      local.add(outputs(received, static_cast<std::size_t>(other)).front(), 1);
+    } catch (...) {
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
 }
 
 std::string carry_out(Order order, const std::string& input, LocalPoints& local, MPI_Comm communicator) {
@@ -214,10 +238,8 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
     case Order::load:
       load(local, PacketReader(input));
       break;
-    case Order::give:
-      return give(local, PacketReader(input));
-    case Order::take:
-      take(local, PacketReader(input));
+    case Order::exchange:
+      exchange(local, PacketReader(input), communicator);
       break;
     case Order::account: {
       const EngineCheck check = local.engine_check();
@@ -232,21 +254,8 @@ std::string carry_out(Order order, const std::string& input, LocalPoints& local,
   return output.take();
 }
 
-/// The answer of a rank: verdict, then the output or the text of the exception.
 std::string answer(Order order, const std::string& input, LocalPoints& local, MPI_Comm communicator) {
-  const auto packed = [](Verdict verdict, std::string_view text) {
-    PacketWriter packet;
-    packet.put(static_cast<std::int32_t>(verdict));
-    packet.put(text);
-    return packet.take();
-  };
-  try {
-    return packed(Verdict::done, carry_out(order, input, local, communicator));
-  } catch (const UserError& error) {
-    return packed(Verdict::user_error, error.what());
-  } catch (const std::exception& error) {
-    return packed(Verdict::error, error.what());
-  }
+  return answer_of([&] { return carry_out(order, input, local, communicator); });
 }
 
 }  // namespace

@@ -19,20 +19,7 @@ void serve(MPI_Comm communicator, LocalPoints& local);
 /// output or the text of an exception.
 namespace ranks {
 
-enum class Order : std::int32_t {
-  add,
-  begin_step,
-  cost,
-  evaluate,
-  commit,
-  report,
-  save,
-  load,
-  give,
-  take,
-  account,
-  end
-};
+enum class Order : std::int32_t { add, begin_step, cost, evaluate, commit, report, save, load, exchange, account, end };
 enum class Verdict : std::int32_t { done, user_error, error, more };
 
 int size_of(MPI_Comm communicator);

@@ -85,16 +85,16 @@ std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner,
 }
 
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
-                           int ranks, double price) {
+                           int ranks, MovePrice price) {
   const std::vector<int> then = reassign(older, owner, ranks, kBalanced);
   const double gain = busiest(loads(latest, owner, ranks)) - busiest(loads(latest, then, ranks));
-  if (gain <= price * busiest(moves(owner, then, ranks))) return owner;
+  if (gain <= busiest(moving(owner, then, ranks, price))) return owner;
   std::vector<double> all(older.begin(), older.end());
   for (std::size_t p = 0; p < all.size(); ++p) all[p] += latest[p];
   return reassign(all, owner, ranks, kBalanced);
 }
 
-std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, double price) {
+std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, MovePrice price) {
   const std::vector<double> now = loads(costs, owner, ranks);
   const double limit = (1 + kBalanced) * mean(now);
   std::vector<std::vector<std::size_t>> points(static_cast<std::size_t>(ranks));  // of each rank, the dearest first
@@ -104,16 +104,16 @@ std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, 
     auto giver = order.extract(std::prev(order.end())), taker = order.extract(order.begin());
     auto& candidates = points[static_cast<std::size_t>(giver.value().second)];
     const auto left = [&](std::size_t point) {
-      return std::max(giver.value().first - costs[point], taker.value().first + costs[point]) + price;
+      return std::max(giver.value().first - costs[point] + price.give, taker.value().first + costs[point] + price.take);
     };
-    const double half = (giver.value().first - taker.value().first) / 2;
+    const double half = (giver.value().first + price.give - taker.value().first - price.take) / 2;
     auto given =
         std::partition_point(candidates.begin(), candidates.end(), [&](std::size_t p) { return costs[p] > half; });
     if (given != candidates.begin() && (given == candidates.end() || left(*std::prev(given)) < left(*given))) --given;
     if (given == candidates.end() || left(*given) >= giver.value().first) return owner;
     owner[*given] = taker.value().second;
-    giver.value().first += price - costs[*given];
-    taker.value().first += price + costs[*given];
+    giver.value().first += price.give - costs[*given];
+    taker.value().first += price.take + costs[*given];
     candidates.erase(given);  // what is taken stays
     order.insert(std::move(giver));
     order.insert(std::move(taker));
@@ -121,14 +121,14 @@ std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, 
   return owner;
 }
 
-std::vector<double> moves(std::span<const int> before, std::span<const int> after, int ranks) {
-  std::vector<double> moves(static_cast<std::size_t>(ranks), 0.0);
+std::vector<double> moving(std::span<const int> before, std::span<const int> after, int ranks, MovePrice price) {
+  std::vector<double> paid(static_cast<std::size_t>(ranks), 0.0);
   for (std::size_t p = 0; p < before.size(); ++p) {
     if (after[p] == before[p]) continue;
-    ++moves[static_cast<std::size_t>(before[p])];
-    ++moves[static_cast<std::size_t>(after[p])];
+    paid[static_cast<std::size_t>(before[p])] += price.give;
+    paid[static_cast<std::size_t>(after[p])] += price.take;
   }
-  return moves;
+  return paid;
 }
 
 std::vector<double> loads(std::span<const double> costs, std::span<const int> owner, int ranks) {

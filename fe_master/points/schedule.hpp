@@ -20,25 +20,33 @@ std::vector<int> assign(std::span<const double> costs, int ranks);
 /// that goes there. Where none has, the better of this and assign(costs, ranks).
 std::vector<int> reassign(std::span<const double> costs, std::vector<int> owner, int ranks, double tolerance);
 
+/// What a rank is kept from its trials by each point that it gives, and that it takes.
+struct MovePrice {
+  double give = 0, take = 0;
+};
+inline MovePrice operator*(double cost, MovePrice price) { return {cost * price.give, cost * price.take}; }
+
+/// In DEM steps of the point: of 1000 spheres, which YADE takes 0.1 to 0.2 s to save or to restore, where a step takes
+/// 1.4 ms; of any engine at most.
+inline constexpr MovePrice kSceneMove{70, 70};
+/// Of a compact cell.
+inline constexpr MovePrice kCellMove{12, 8};
+
 /// What pays: reassign() of older and latest costs together, to 2 % of the mean, where that of the older costs alone
-/// would have taken more off the busiest rank in the latest than the moves cost that take longest: `price` for each
-/// point that a rank gives or takes, the ranks side by side; else `owner`.
+/// would have taken more off the busiest rank in the latest than the moves cost that take longest, the ranks side by
+/// side; else `owner`.
 /// Costs that do not tell those to come move nothing: dealing in turn spreads a band over all ranks, and is hard to
 /// beat by costs that change by a quarter from step to step (validation/scaling).
 std::vector<int> rebalance(std::span<const double> older, std::span<const double> latest, const std::vector<int>& owner,
-                           int ranks, double price);
+                           int ranks, MovePrice price);
 
 /// What pays where the costs are those to come: a point at a time goes from the busiest rank to the idlest, the one
 /// that leaves both with least, as long as that takes something off the busiest, which has more than 2 % above the
-/// mean. `price`: what it costs to give a point, and to take one.
-std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, double price);
+/// mean.
+std::vector<int> relieve(std::span<const double> costs, std::vector<int> owner, int ranks, MovePrice price);
 
-/// Points that each rank gives or takes.
-std::vector<double> moves(std::span<const int> before, std::span<const int> after, int ranks);
-
-/// DEM steps that it costs a rank to give a VE or to take one, at most: 0.2 s to save and to restore 1000 spheres in
-/// YADE, where a step takes 1.4 ms. A compact cell takes 0.6 and 0.1 ms, its step 0.06, and its way through rank 0.
-inline constexpr double kMoveSteps = 70;
+/// What each rank pays for what it gives and takes.
+std::vector<double> moving(std::span<const int> before, std::span<const int> after, int ranks, MovePrice price);
 
 /// Cost of all points of each rank.
 std::vector<double> loads(std::span<const double> costs, std::span<const int> owner, int ranks);

@@ -31,6 +31,7 @@ struct VeParameters {
   double script_memory = 8.0;          ///< that the script may allocate [GB]
   double script_output = 100.0;        ///< that the script may print, and write into one file [MB]
   std::string scene_sha256;            ///< of the scene's file, or "any": who is asked to load it trusts it
+  bool moments = true;                 ///< that contacts of a script or scene pass
   int spheres = 1000;
   double size_ratio = 1.5;                        ///< largest over smallest diameter [-]
   double kappa = 500.0;                           ///< k_n / (sigma_0 a) [-]

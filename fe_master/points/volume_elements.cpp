@@ -21,8 +21,7 @@ using namespace ranks;
 
 namespace {
 
-constexpr double kMostlyDistinct = 0.9;    // of the points: where fewer histories differ, points share cells
-constexpr std::size_t kMovedAtOnce = 256;  // states that rank 0 holds while they move
+constexpr double kMostlyDistinct = 0.9;  // of the points: where fewer histories differ, points share cells
 
 /// Points of each rank, in order.
 std::vector<std::vector<std::size_t>> shares(const std::vector<int>& owner, int ranks) {
@@ -232,13 +231,14 @@ Balance VolumeElements::balance(bool may_move) {
   const int ranks = size_of(communicator_);
   const std::vector<int> now = owners();
   const double steps = statistics_.dem_steps - at_last_balance_.dem_steps;
-  const double price = kMoveSteps * std::accumulate(latest_.begin(), latest_.end(), 0.0) / std::max(steps, 1.0);
+  const double of_step = std::accumulate(latest_.begin(), latest_.end(), 0.0) / std::max(steps, 1.0);
   const bool may = may_move && !shared();
-  const std::vector<int> next = may ? rebalance(older_, latest_, now, ranks, price) : now;
+  const std::vector<int> next = may ? rebalance(older_, latest_, now, ranks, of_step * kSceneMove) : now;
   const std::size_t moved = move_to(next);
   Balance balance{imbalance(loads(latest_, now, ranks)),
                   imbalance(loads(latest_, next, ranks)),
                   moved,
+                  statistics_.move_seconds - at_last_balance_.move_seconds,
                   statistics_.efficiency(at_last_balance_, ranks),
                   statistics_.clock_efficiency(at_last_balance_, ranks),
                   statistics_.working_share(at_last_balance_, ranks * local_.threads())};
@@ -265,68 +265,53 @@ void VolumeElements::relieve_ranks(std::span<const Tensor2> F) {
     if (packet.get<std::size_t>() != shares_[rank].size()) return;
     for (const std::size_t point : shares_[rank]) costs[point] = trials * packet.get<double>();
   }
-  const double price = kMoveSteps * statistics_.cost / statistics_.dem_steps * local_.threads();
-  move_to(relieve(costs, owners(), static_cast<int>(shares_.size()), price));
+  const double of_step = statistics_.cost / statistics_.dem_steps * local_.threads();
+  move_to(relieve(costs, owners(), static_cast<int>(shares_.size()), of_step * kCellMove));
 }
 
-/// Points go to these ranks; how many have moved.
+/// Points go to these ranks, from the one that has them straight to the other; how many have moved.
 std::size_t VolumeElements::move_to(const std::vector<int>& owner) {
   const std::vector<int> now = owners();
-  std::vector<std::size_t> moving;
-  for (std::size_t p = 0; p < size(); ++p)
-    if (owner[p] != now[p]) moving.push_back(p);
-  for (std::size_t first = 0; first < moving.size(); first += kMovedAtOnce)
-    move(std::span(moving).subspan(first, std::min(kMovedAtOnce, moving.size() - first)), owner);
-  statistics_.moved += static_cast<long>(moving.size());
-  return moving.size();
+  std::vector<std::size_t> moves(shares_.size(), 0);
+  std::vector<PacketWriter> packets(shares_.size());
+  std::size_t moved = 0;
+  for (std::size_t p = 0; p < size(); ++p) {
+    if (owner[p] == now[p]) continue;
+    const auto from = static_cast<std::size_t>(now[p]), to = static_cast<std::size_t>(owner[p]);
+    const auto place = std::find(shares_[from].begin(), shares_[from].end(), p);
+    packets[from].put(owner[p]);
+    packets[from].put(true);
+    packets[from].put(static_cast<std::size_t>(place - shares_[from].begin()));
+    packets[to].put(now[p]);
+    packets[to].put(false);
+    ++moves[from];
+    ++moves[to];
+    shares_[from].erase(place);
+    shares_[to].push_back(p);
+    ++moved;
+  }
+  if (moved == 0) return 0;
+  std::vector<std::string> inputs;
+  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+    PacketWriter head;
+    head.put(moves[rank]);
+    inputs.push_back(head.take() + packets[rank].take());
+  }
+  const auto start = std::chrono::steady_clock::now();
+  command(communicator_, Order::exchange, inputs, local_);
+  statistics_.move_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  statistics_.moved += static_cast<long>(moved);
+  return moved;
 }
 
 std::string describe(const Balance& balance, std::size_t points) {
   const std::string found = fmt::format(
       "balance of the ranks since the last checkpoint: {:.3f} of ideal by counted cost, {:.3f} by the clock, "
-      "{:.3f} with all that evaluations take besides; {} moves of {} points",
-      balance.counted, balance.clocked, balance.working, balance.moved, points);
+      "{:.3f} with all that evaluations take besides; {} moves of {} points in {:.2g} s",
+      balance.counted, balance.clocked, balance.working, balance.moved, points, balance.seconds);
   if (balance.before == balance.after) return found;
   return found +
          fmt::format(", the busiest rank has {:.3f} instead of {:.3f} of the mean", balance.after, balance.before);
-}
-
-/// Takes these points from their ranks to those of `owner`.
-void VolumeElements::move(std::span<const std::size_t> points, const std::vector<int>& owner) {
-  std::vector<std::vector<std::size_t>> given(shares_.size());
-  std::vector<std::string> inputs;
-  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
-    std::vector<std::size_t> places, kept;
-    for (std::size_t place = 0; place < shares_[rank].size(); ++place) {
-      const std::size_t point = shares_[rank][place];
-      const bool goes = std::binary_search(points.begin(), points.end(), point);
-      if (goes) places.push_back(place);
-      (goes ? given[rank] : kept).push_back(point);
-    }
-    shares_[rank] = std::move(kept);
-    PacketWriter packet;
-    packet.put(places.size());
-    for (const std::size_t place : places) packet.put(place);
-    inputs.push_back(packet.take());
-  }
-  const std::vector<std::string> answers = command(communicator_, Order::give, inputs, local_);
-  std::vector<std::size_t> taken(shares_.size(), 0);
-  std::vector<PacketWriter> states(shares_.size());
-  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
-    PacketReader packet(answers[rank]);
-    for (const std::size_t point : given[rank]) {
-      const auto to = static_cast<std::size_t>(owner[point]);
-      states[to].put(packet.get_text());
-      shares_[to].push_back(point);
-      ++taken[to];
-    }
-  }
-  for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
-    PacketWriter packet;
-    packet.put(taken[rank]);
-    inputs[rank] = packet.take() + states[rank].take();
-  }
-  command(communicator_, Order::take, inputs, local_);
 }
 
 VolumeElements::Account VolumeElements::account() {

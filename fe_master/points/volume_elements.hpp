@@ -15,6 +15,7 @@ namespace femxdem {
 struct Balance {
   double before = 1, after = 1;
   std::size_t moved = 0;
+  double seconds = 0;               ///< wall time of the moves
   double counted = 1, clocked = 1;  ///< mean rank's trials over the busiest one's in the batches since the last time
   double working = 1;               ///< trials of all processors over the wall time of those batches
 };
@@ -35,6 +36,7 @@ struct FarmStatistics {
   double critical_cost = 0;     ///< of the busiest rank of each batch, summed
   double critical_seconds = 0;  ///< the same of its trials' times
   long moved = 0;               ///< points that went to another rank
+  double move_seconds = 0;      ///< wall time of that on rank 0
   Balance last_move;
 
   /// Mean rank over the busiest one in the batches since then, by cost and by the clock; 1 where there were none.
@@ -101,7 +103,6 @@ class VolumeElements : public MaterialPoints {
   bool shared() const;
   void relieve_ranks(std::span<const Tensor2> F);
   std::size_t move_to(const std::vector<int>& owner);
-  void move(std::span<const std::size_t> points, const std::vector<int>& owner);
 
   MPI_Comm communicator_;
   LocalPoints& local_;

@@ -146,7 +146,7 @@ def advise(case, file, program, folder, error, band, points):
     said.say("tolerance", f"solver.tolerance = {tolerance:g} errs by {percent(of_tolerance)} (this case: {given:g})",
              solver__tolerance=tolerance)
     say_softening(said, case, base, band, ve)
-    say_not_needed(said, compared, usual, base, ve, limit, probes.engine, off)
+    say_not_needed(said, compared, usual, base, ve, limit, manifest["moments"] and ve["moments"], probes.engine, off)
     if points:
         own = predicted(base, case, points, spheres, ve["inertial_number"], given, ve["min_steps"], engine)
         say_cost(said, "as it is", own, points)
@@ -236,7 +236,7 @@ def say_softening(said, case, base, band, ve):
              f"{thickness / ELEMENTS_FOR_FORCE:.2g} m for the force, {thickness / ELEMENTS_FOR_WIDTH:.2g} m for the thickness", **values)
 
 
-def say_not_needed(said, compared, usual, base, ve, limit, engine, off_by):
+def say_not_needed(said, compared, usual, base, ve, limit, moments, engine, off_by):
     if ve["source"] == "prepare" and ve["contact_law"] != "friction":
         if ve["cohesion"] == 0:
             said.say("not needed", "cohesion: ve.cohesion is 0, ve.contact_law = \"friction\" is the same and cheaper",
@@ -246,6 +246,13 @@ def say_not_needed(said, compared, usual, base, ve, limit, engine, off_by):
             values = {"ve__contact_law": "friction", "ve__cohesion": 0.0} if off <= limit else {}
             said.say("not needed" if values else "needed", f"cohesion: without it the curve is off by {percent(off)}; "
                      f"{percent(base.adhesive)} of the contacts adhere at the end", **values)
+    if moments:
+        without = compared("without_moments", moments=False)
+        off = off_by(without, usual)
+        values = {"ve__moments": False} if off <= limit else {}
+        said.numbers["moments"] = off
+        said.say("not needed" if values else "needed", f"moments of the contacts: without them the curve is off by "
+                 f"{percent(off)}, and a DEM step takes {1e6 * without.step_seconds:.0f} us instead of {1e6 * base.step_seconds:.0f}", **values)
     said.say("elastic", f"points whose strain stays below {percent(elastic_until(base))} (secant stiffness above 0.8 of the first)")
     said.say("engine", engine)
 

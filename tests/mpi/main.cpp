@@ -108,14 +108,12 @@ std::vector<double> PathLengthPoints::costs(std::span<const Tensor2>) const {
 }
 
 std::string PathLengthPoints::save_one(std::size_t index) {
+  if (committed_[index].length > 10) throw std::runtime_error("too long to be saved");
   return {reinterpret_cast<const char*>(&committed_[index]), sizeof(State)};
 }
 
 void PathLengthPoints::save_each(const TakeState& take) {
-  for (std::size_t i = 0; i < size(); ++i) {
-    if (committed_[i].length > 10) throw std::runtime_error("too long to be saved");
-    take(save_one(i), std::array{i});
-  }
+  for (std::size_t i = 0; i < size(); ++i) take(save_one(i), std::array{i});
 }
 
 void PathLengthPoints::load_into(std::span<const std::size_t> points, const std::string& state) {

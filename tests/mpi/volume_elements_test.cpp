@@ -160,6 +160,29 @@ TEST(VolumeElements, PointsStayWhereMovingCostsMoreThanItSavesAndWhereTheyShareH
   EXPECT_EQ(moved(20, equal), 0u) << "points with equal histories may share a cell";
 }
 
+TEST(VolumeElements, AGiverThatFailsTellsItsTaker) {
+  if (ranks() == 1) return;
+  const std::vector<int> points = heavy_on_rank_0(40);
+  Farm farm(Law::path_length, kTemplates, points);
+  std::vector<Tensor2> F = distinct_gradients(points.size(), 1e-2);
+  const auto step_to = [&](double stretch) {
+    for (Tensor2& gradient : F) gradient(2, 2) = stretch;
+    farm.points->begin_step();
+    farm.points->evaluate(F, Operator::none);
+    farm.points->commit();
+  };
+  step_to(9);
+  step_to(1);  // the path of each is too long now for it to be saved
+  farm.points->balance_each_step();
+  std::string said;
+  try {
+    step_to(1);
+  } catch (const std::runtime_error& error) {
+    said = error.what();
+  }
+  EXPECT_TRUE(said.ends_with(": rank 0: too long to be saved")) << said;
+}
+
 TEST(VolumeElements, MovedWorkersKeepTheirBits) {
   PythonVolumeElements reference(worker_for_comparison(), {});
   const std::vector<std::string> templates = {reference.make_template("{}").state};

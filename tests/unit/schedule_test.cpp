@@ -104,32 +104,34 @@ TEST(Schedule, ReassignedLoadsAreWithinTheToleranceForFewerMovesThanAnew) {
 TEST(Schedule, PointsMoveOnlyWhereThatPays) {
   const std::vector<double> costs = {10, 10, 10, 10};
   const std::vector<int> owner = {0, 0, 0, 1};  // one move takes 10 off the busiest
-  EXPECT_EQ(rebalance(costs, costs, owner, 2, 11), owner);
-  EXPECT_EQ(moved(rebalance(costs, costs, owner, 2, 9), owner), 1u);
+  EXPECT_EQ(rebalance(costs, costs, owner, 2, {11, 11}), owner);
+  EXPECT_EQ(moved(rebalance(costs, costs, owner, 2, {9, 9}), owner), 1u);
 }
 
 TEST(Schedule, RanksMovePointsSideBySide) {
   const std::vector<double> costs(8, 10.0);
   const std::vector<int> owner = {0, 0, 0, 1, 1, 1, 2, 3};  // two moves, each of another pair of ranks, take 10 off
-  EXPECT_EQ(moved(rebalance(costs, costs, owner, 4, 9), owner), 2u);
+  EXPECT_EQ(moved(rebalance(costs, costs, owner, 4, {9, 9}), owner), 2u);
 }
 
 TEST(Schedule, CostsThatDoNotTellThoseToComeMoveNothing) {
   const std::vector<double> older = {10, 10, 10, 10}, latest = {1, 1, 1, 27};
   const std::vector<int> owner = {0, 0, 0, 1};  // by the older costs a point would go to rank 1
-  EXPECT_EQ(rebalance(older, latest, owner, 2, 0), owner);
-  EXPECT_EQ(rebalance(std::vector<double>(4, 0.0), latest, owner, 2, 0), owner) << "nothing is known yet";
+  EXPECT_EQ(rebalance(older, latest, owner, 2, {0, 0}), owner);
+  EXPECT_EQ(rebalance(std::vector<double>(4, 0.0), latest, owner, 2, {0, 0}), owner) << "nothing is known yet";
 }
 
 TEST(Schedule, RelievesTheBusiestRankByThePointThatLeavesLeast) {
   const std::vector<double> costs = {8, 4, 3, 1, 2};
   const std::vector<int> owner = {0, 0, 0, 0, 1};  // 16 | 2: 3 leaves 13, 4 leaves 12, 8 leaves 10 for the other
-  EXPECT_EQ(relieve(costs, owner, 2, 0), (std::vector<int>{1, 0, 0, 0, 1}));
-  EXPECT_EQ(relieve(costs, owner, 2, 5.9), (std::vector<int>{1, 0, 0, 0, 1}));
-  EXPECT_EQ(relieve(costs, owner, 2, 6), owner) << "10 and the price is what it had";
-  EXPECT_EQ(moves(owner, std::vector<int>{1, 1, 0, 0, 1}, 2), (std::vector<double>{2, 2}));
-  EXPECT_EQ(relieve(costs, std::vector<int>(5, 0), 1, 0), std::vector<int>(5, 0));
-  EXPECT_EQ(relieve(std::vector<double>(5, 0.0), owner, 2, 0), owner);
+  EXPECT_EQ(relieve(costs, owner, 2, {}), (std::vector<int>{1, 0, 0, 0, 1}));
+  EXPECT_EQ(relieve(costs, owner, 2, {5.9, 5.9}), (std::vector<int>{1, 0, 0, 0, 1}));
+  EXPECT_EQ(relieve(costs, owner, 2, {6, 6}), owner) << "10 and the price is what it had";
+  EXPECT_EQ(relieve(costs, owner, 2, {3, 0}), (std::vector<int>{1, 0, 0, 0, 1})) << "11 and 10 are left";
+  EXPECT_EQ(relieve(costs, owner, 2, {0, 3}), (std::vector<int>{0, 1, 0, 0, 1})) << "12 and 9, not 8 and 13";
+  EXPECT_EQ(moving(owner, std::vector<int>{1, 1, 0, 0, 0}, 2, {7, 2}), (std::vector<double>{16, 11}));
+  EXPECT_EQ(relieve(costs, std::vector<int>(5, 0), 1, {}), std::vector<int>(5, 0));
+  EXPECT_EQ(relieve(std::vector<double>(5, 0.0), owner, 2, {}), owner);
 }
 
 TEST(Schedule, RelievesRanksOfARecordedBandAsFarAsThePriceAllows) {
@@ -137,7 +139,9 @@ TEST(Schedule, RelievesRanksOfARecordedBandAsFarAsThePriceAllows) {
   std::mt19937 generator(1);
   for (int p = 0; p < 64 * 20; ++p) costs.push_back((generator() % 10 == 0 ? 80 : 10) + generator() % 5);
   const std::vector<int> owner = assign(costs.size(), 64);
-  const auto after = [&](double price) { return imbalance(loads(costs, relieve(costs, owner, 64, price), 64)); };
+  const auto after = [&](double price) {
+    return imbalance(loads(costs, relieve(costs, owner, 64, {price, price}), 64));
+  };
   EXPECT_GT(imbalance(loads(costs, owner, 64)), 1.5);
   EXPECT_LT(after(0), 1.06);
   EXPECT_LT(after(20), after(60));

@@ -103,6 +103,30 @@ class Script(Folder):
             with self.subTest(reason), self.assertRaisesRegex(ValueError, reason):
                 engine().make_template(self.script(end="O.step()\n" + extra))
 
+    def test_moments_of_contacts_are_taken_away_where_the_case_says_so(self):
+        rolling = {
+            "FrictMat(young=1e7,": "CohFrictMat(momentRotationLaw=True, alphaKr=2, alphaKtw=2, etaRoll=0.5, isCohesive=False, young=1e7,",
+            "Ig2_Sphere_Sphere_ScGeom()": "Ig2_Sphere_Sphere_ScGeom6D()",
+            "Ip2_FrictMat_FrictMat_FrictPhys()": "Ip2_CohFrictMat_CohFrictMat_CohFrictPhys()",
+            "Law2_ScGeom_FrictPhys_CundallStrack()": "Law2_ScGeom6D_CohFrictPhys_CohesionMoment(always_use_moment_law=True)",
+        }
+        spec, by_hand = self.script(), self.folder / "by_hand.py"
+        theirs = self.folder / "theirs.py"
+        for a, b in rolling.items():
+            theirs.write_text(theirs.read_text().replace(a, b))
+        without = "O.engines[2].lawDispatcher.functors[0].always_use_moment_law = False\nfor x in [b.mat for b in O.bodies] + [i.phys for i in O.interactions]: x.momentRotationLaw = False\n"
+        zero = "for i in O.interactions: i.phys.moment_bending = i.phys.moment_twist = Vector3.Zero; i.phys.kr = i.phys.ktw = 0\n"
+        by_hand.write_text(theirs.read_text() + without + zero)
+        stresses = []
+        for asked in (spec, {**spec, "moments": False}, {**spec, "script": str(by_hand)}):
+            made = engine().make_template(asked)
+            self.assertEqual(made["manifest"]["moments"], asked["script"] != str(by_hand))
+            ve = engine().add(made["state"])
+            engine().deform(ve, rate(ve, 2e-2, np.diag([0.5, -1.0, 0.5])), 400)
+            stresses.append(measure(ve)[0])
+        np.testing.assert_array_equal(stresses[1], stresses[2])
+        self.assertGreater(np.abs(stresses[0] - stresses[1]).max(), 0.05 * np.abs(stresses[0]).max())
+
     def test_missing_script(self):
         with self.assertRaisesRegex(ValueError, "ve.script = .*no such file"):
             engine().make_template(users("script", "/nowhere/theirs.py"))

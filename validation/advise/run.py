@@ -26,6 +26,7 @@ from ve_runs import relative_distance
 ROWS = {  # advised and run: name: (case, settings of advice and run, seeds of the scatter)
     "small": ("../biaxial/small.toml", [], (1, 2, 3)),
     "script": ("script.toml", [], ()),
+    "moments": ("script.toml", ['ve.arguments=["rolling"]'], ()),
 }
 FINISHED = {  # what one probe tells of runs that are done: (case, settings, evaluations, DEM steps, its page)
     "demo": ("../biaxial/demo.toml", [], 177, 2.40e6, "biaxial"),
@@ -124,15 +125,23 @@ def mean_curve(c, settings):
 def errors(c):
     """Lines of the table of errors, and whether all are within their limit."""
     told, _ = advice(c, ERROR_CASE, *ROWS[ERROR_CASE][:2])
-    lines, good = [], True
-    for name, (of, one, other) in ERRORS.items():
-        given = [tuple(s.format(tolerance=told["values"]["solver.tolerance"]) for s in settings) for settings in (one, other)]
-        predicted, measured = of(told), relative_distance(*(mean_curve(c, settings) for settings in given))
+    lines = []
+
+    def add(name, predicted, measured):
         fits = 1 / ERROR <= predicted / measured <= ERROR
-        good = good and fits
         lines.append(f"| {name} | {100 * predicted:.2g} % / {100 * measured:.2g} % = {predicted / measured:.2f} | {'ok' if fits else '**off**'} |")
         print(lines[-1], flush=True)
-    return lines, good
+
+    for name, (of, one, other) in ERRORS.items():
+        given = [tuple(s.format(tolerance=told["values"]["solver.tolerance"]) for s in settings) for settings in (one, other)]
+        add(name, of(told), relative_distance(*(mean_curve(c, settings) for settings in given)))
+    case, settings, _ = ROWS["moments"]
+    told, _ = advice(c, "moments", case, settings)
+    runs = [c.run(case, folder, *settings, *more, "ve.threads=1", c.cache) for folder, more in (("errors/without_moments", ("ve.moments=false",)), ("moments", ()))]
+    grid = np.linspace(0.002, 0.0195, 101)
+    curves = [np.interp(grid, k.strain, k.stress) for k in (axial_curve(run.folder, nominal=True) for run in runs)]
+    add("`moments` without moments", told["moments"], relative_distance(*curves))
+    return lines, all("**off**" not in line for line in lines)
 
 
 def verify(c, names):

@@ -15,6 +15,7 @@ from typing import NamedTuple
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tools"))
 import campaign
+import choice
 import element_rates
 
 import matplotlib.pyplot as plt
@@ -152,6 +153,30 @@ def draw(curves, file):
     figure.savefig(file, dpi=90, bbox_inches="tight")
 
 
+def write_choice(c, runs):
+    """Table and figure of what rate, answer and damping cost and err by (choice.py)."""
+    plain = {}
+    for key, run in runs.items():
+        answer = key.answer + ", damping 0.7" * (key.damping == 0.7)
+        if (key.mesh, key.increment) == ("4x8", "") and answer in choice.MARKERS:
+            history = run.history()
+            plain[key] = choice.Run(key.spheres, key.number, answer, *curve(history), history["evaluations"][history["step"] > 0],
+                                    history["dem_steps"].sum(), len(run.rejections()))
+    found = choice.rows([r for k, r in plain.items() if k.seed == 1])
+    if not found:
+        return
+    packings = {}
+    for key, run in plain.items():
+        if run.answer == "mean" and run.strain[-1] >= choice.AT[-1]:
+            packings.setdefault((key.spheres, -key.number), []).append(run)
+    scatters = {spheres: choice.scatter(of) for (spheres, _), of in sorted(packings.items()) if len(of) > 2}
+    lines = choice.table(found)
+    print(*lines, sep="\n")
+    said = ", ".join(f"{100 * s:.1f} % at {n} spheres" for n, s in scatters.items())
+    c.table([*lines, "", f"Another packing of as many spheres moves the curve by (standard deviation of three): {said}."], mark="choice")
+    choice.draw(found, scatters, c.product("choice.png"))
+
+
 def work(c, chosen, strain, as_they_are):
     lines, curves, runs = [], [], {}
     if YADE_ALONE in chosen and not as_they_are:
@@ -169,6 +194,7 @@ def work(c, chosen, strain, as_they_are):
     if len(over_rates := rates(runs)) > 2:
         print(*over_rates, sep="\n")
         c.table(over_rates, mark="rates")
+    write_choice(c, runs)
     if curves:
         draw(curves, c.product("quasi_static.png"))
 

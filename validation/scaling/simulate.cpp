@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
-#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -29,15 +28,15 @@ std::vector<double> read(const std::string& file) {
 
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
-/// Time of the busiest rank, whose threads take its points longest first, after it has moved as many, each at a price.
+/// Time of the busiest rank, whose threads take its points longest first, after what it has paid for moves.
 double busiest(std::span<const double> costs, const std::vector<int>& owner, int ranks, int threads,
-               const std::vector<double>& moved = {}, double price = 0) {
+               const std::vector<double>& paid = {}) {
   std::vector<std::vector<double>> share(static_cast<std::size_t>(ranks));
   for (std::size_t p = 0; p < costs.size(); ++p) share[static_cast<std::size_t>(owner[p])].push_back(costs[p]);
   double most = 0;
   for (std::size_t rank = 0; rank < share.size(); ++rank) {
-    const double moving = moved.empty() ? 0 : price * moved[rank];
-    most = std::max(most, moving + largest(loads(share[rank], assign(share[rank], threads), threads)));
+    most = std::max(
+        most, (paid.empty() ? 0 : paid[rank]) + largest(loads(share[rank], assign(share[rank], threads), threads)));
   }
   return most;
 }
@@ -53,7 +52,7 @@ struct Policy {
 
 /// As VolumeElements::balance does every `window` batches.
 Policy balanced(const std::vector<double>& costs, std::size_t points, Machine machine, std::size_t window,
-                double price) {
+                MovePrice price) {
   Policy policy;
   std::vector<int> owner = assign(points, machine.ranks);
   std::vector<double> latest(points, 0.0), older(points, 0.0);
@@ -71,16 +70,16 @@ Policy balanced(const std::vector<double>& costs, std::size_t points, Machine ma
 }
 
 /// As VolumeElements::balance_each_step; a batch is a step, and what moves before it is in its time.
-Policy each_step(const std::vector<double>& costs, std::size_t points, Machine machine, double price) {
+Policy each_step(const std::vector<double>& costs, std::size_t points, Machine machine, MovePrice price) {
   Policy policy;
   std::vector<int> owner = assign(points, machine.ranks);
   for (std::size_t batch = 0; (batch + 1) * points <= costs.size(); ++batch) {
     const std::span<const double> now(costs.data() + batch * points, points);
-    const std::vector<int> next = batch == 0 ? owner : relieve(now, owner, machine.ranks, price * machine.threads);
-    const std::vector<double> moved = moves(owner, next, machine.ranks);
-    policy.moved += static_cast<std::size_t>(std::accumulate(moved.begin(), moved.end(), 0.0)) / 2;
+    const std::vector<int> next = batch == 0 ? owner : relieve(now, owner, machine.ranks, machine.threads * price);
+    const std::vector<double> paid = moving(owner, next, machine.ranks, price);
+    for (std::size_t p = 0; p < points; ++p) policy.moved += next[p] != owner[p];
     owner = next;
-    policy.busiest.push_back(busiest(now, owner, machine.ranks, machine.threads, moved, price));
+    policy.busiest.push_back(busiest(now, owner, machine.ranks, machine.threads, paid));
   }
   return policy;
 }
@@ -116,11 +115,11 @@ int main(int argc, char** argv) {
     const std::vector<double> costs = read(argv[1]);
     const std::size_t points = std::stoul(argv[2]), window = std::stoul(argv[5]);
     const Machine machine{std::stoi(argv[3]), std::stoi(argv[4])};
-    const double price = kMoveSteps * std::stod(argv[6]);
+    const double of_step = std::stod(argv[6]);
     fmt::print("{{\n");
-    print("static", balanced(costs, points, machine, 0, price), ",");
-    print("balanced", balanced(costs, points, machine, window, price), ",");
-    print("each_step", each_step(costs, points, machine, price), ",");
+    print("static", balanced(costs, points, machine, 0, {}), ",");
+    print("balanced", balanced(costs, points, machine, window, of_step * kSceneMove), ",");
+    print("each_step", each_step(costs, points, machine, of_step * kCellMove), ",");
     print("foreseen", foreseen(costs, points, machine), "");
     fmt::print("}}\n");
   } catch (const std::exception& error) {
