@@ -231,10 +231,10 @@ void CompactVolumeElements::strain(Trial& trial, Operator wanted) const {
 void CompactVolumeElements::deform(Trial& trial) const {
   CompactCell& cell = *trial.cell;
   cell = *trial.from;
-  const CompactCell::Sampling sampling =
-      answers_mean(options_) ? CompactCell::Sampling{kSampleEvery, lateness(options_, trial.straining.steps)}
-                             : CompactCell::Sampling{};
   const long steps = trial.straining.steps;
+  const CompactCell::Sampling sampling = answers_mean(options_)
+                                             ? CompactCell::Sampling{sample_every(steps), lateness(options_, steps)}
+                                             : CompactCell::Sampling{};
   if (options_.start_at_rest && steps > 0) cell.rest();
   const CompactCell::Deformed end = cell.deform(trial.straining.velocity_gradient, steps, sampling);
   trial.failure = end.failure;

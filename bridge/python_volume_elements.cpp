@@ -117,7 +117,7 @@ Straining PythonVolumeElements::plan(std::size_t index, const Tensor2& F) {
   const Straining straining = plan_straining(options_, points_[index], slot.info.time_step, index, F);
   slot.steps = straining.steps;
   slot.velocity_gradient = straining.velocity_gradient;
-  slot.sample_every = answers_mean(options_) ? kSampleEvery : 0;
+  slot.sample_every = answers_mean(options_) ? sample_every(straining.steps) : 0;
   slot.late = lateness(options_, straining.steps);
   return straining;
 }

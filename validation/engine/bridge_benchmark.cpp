@@ -8,8 +8,10 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <random>
 #include <sstream>
 
+#include "compact_volume_elements.hpp"
 #include "python_volume_elements.hpp"
 #include "rank_service.hpp"
 #include "ve_templates.hpp"
@@ -20,6 +22,7 @@
 ///     bridge_benchmark snapshot --spheres 1000                  fork against serialise, trials of one DEM step
 ///     bridge_benchmark trial --inertial-number 0.02 --steps 10  trials as a solver asks for them
 ///     mpirun -np 2 bridge_benchmark overhead --spheres 1000     engine seconds over ranks x wall time of evaluate
+///     mpirun -np 2 bridge_benchmark moves --spheres 1000        a compact cell's way to another rank, in its DEM steps
 namespace femxdem {
 namespace {
 
@@ -165,8 +168,7 @@ void print_trial_costs(WorkerProcess& worker, const Settings& settings) {
       median(rejected), median(kernel), median(committed));
 }
 
-void print_overhead(PythonVolumeElements& local, const Settings& settings) {
-  const std::string state = packing(local, settings);
+void print_overhead(LocalPoints& local, const std::string& state, const Settings& settings) {
   VolumeElements points(MPI_COMM_WORLD, local, {state}, std::vector<int>(settings.points, 0));
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
@@ -185,15 +187,42 @@ void print_overhead(PythonVolumeElements& local, const Settings& settings) {
   fmt::print("workers' memory {:.0f} MB\n", static_cast<double>(points.account().peak_memory) / 1e6);
 }
 
-void measure_overhead(WorkerProcess& worker, const Settings& settings) {
+/// Every fourth point has a long trial, in each step another fourth: ranks give and take before the first trial.
+void print_moves(LocalPoints& local, const std::string& state, const Settings& settings) {
+  VolumeElements points(MPI_COMM_WORLD, local, {state}, std::vector<int>(settings.points, 0));
+  points.balance_each_step();
+  std::mt19937 generator(1);
+  std::vector<double> strain(settings.points, 0.0);
+  for (int step = 0; step < settings.repetitions; ++step) {
+    std::vector<Tensor2> F(settings.points, Tensor2::Identity());
+    for (std::size_t p = 0; p < settings.points; ++p) {
+      strain[p] += generator() % 4 == 0 ? 4e-3 : 1e-5 + 1e-9 * static_cast<double>(p);
+      F[p](1, 1) -= strain[p];
+    }
+    points.begin_step();
+    points.evaluate(F, Operator::none);
+    points.commit();
+  }
+  const FarmStatistics& s = points.statistics();
+  const double move = 1e3 * s.move_seconds / static_cast<double>(s.moved),
+               of_step = 1e3 * s.engine_seconds / s.dem_steps;
+  fmt::print("{} points of {} spheres, {} steps: {} moves, {:.3f} ms each; a DEM step {:.4f} ms: {:.1f} of them\n",
+             settings.points, settings.spheres, settings.repetitions, s.moved, move, of_step, move / of_step);
+}
+
+/// What rank 0 does with its local points, while the others serve.
+template <class Measure>
+void on_ranks(WorkerProcess& worker, const Settings& settings, bool compact, Measure measure) {
   MPI_Init(nullptr, nullptr);
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  PythonVolumeElements local(worker, options(settings));
+  PythonVolumeElements scenes(worker, options(settings));
+  CompactVolumeElements cells(worker, options(settings), {});
+  LocalPoints& local = compact ? static_cast<LocalPoints&>(cells) : scenes;
   if (rank > 0)
     serve(MPI_COMM_WORLD, local);
   else
-    print_overhead(local, settings);
+    measure(local, packing(scenes, settings), settings);
   MPI_Finalize();
 }
 
@@ -207,8 +236,9 @@ int main(int argc, char** argv) {
   CLI::App* snapshot = app.add_subcommand("snapshot", "fork against serialise");
   CLI::App* trial = app.add_subcommand("trial", "trials as a solver asks for them");
   CLI::App* overhead = app.add_subcommand("overhead", "engine seconds over ranks x wall time of evaluate");
+  CLI::App* moves = app.add_subcommand("moves", "a compact cell's way from rank to rank");
   app.require_subcommand(1);
-  for (CLI::App* command : {snapshot, trial, overhead}) {
+  for (CLI::App* command : {snapshot, trial, overhead, moves}) {
     command->add_option("--spheres", settings.spheres, "of a volume element");
     command->add_option("--points", settings.points, "volume elements in all");
     command->add_option("--steps", settings.steps, "of a trial");
@@ -225,5 +255,5 @@ int main(int argc, char** argv) {
   else if (trial->parsed())
     print_trial_costs(worker, settings);
   else
-    measure_overhead(worker, settings);
+    on_ranks(worker, settings, moves->parsed(), moves->parsed() ? print_moves : print_overhead);
 }
