@@ -35,9 +35,9 @@ struct VolumeElementOptions {
   std::function<void(std::string_view)> say = [](std::string_view) {};
 };
 
-/// DEM steps between the stresses of a mean over `steps`: one stress takes 0.4 of a step. It is off by 1e-5 to 5e-5 of
-/// the mean of all of them, half of what small changes of a trial move it by (validation/quasi_static).
-inline long sample_every(long steps) { return std::clamp(steps / 25, 1L, 8L); }
+/// DEM steps between the stresses of a mean over `steps`: one stress takes 0.4 of a step. It is off by 1e-5 to 3e-5 of
+/// the mean of all of them, a fifth of what small changes of a trial move it by (validation/quasi_static).
+inline long sample_every(long steps) { return std::clamp(steps / 25, 1L, 4L); }
 
 /// Whether a trial answers with a mean, and how late its stresses weigh then.
 inline bool answers_mean(const VolumeElementOptions& options) { return options.answer_at < 1; }

@@ -43,6 +43,7 @@ class Path:
     step_seconds: float  #: of one DEM step: the median over the steps, which other work on the machine moves little
     adhesive: float  #: share of the contacts that adhere at the end
     unbalanced: float  #: largest unbalanced force
+    eased: float = 1.0  #: eased_by()
 
 
 def path_of(history, inertial_number):
@@ -171,6 +172,13 @@ def evaluations(spheres, inertial_number, tolerance, past):
     return max(1.0, found)
 
 
+def eased_by(path, trials, spheres, inertial_number, tolerance):
+    """By what evaluations() are to be multiplied before the peak, where the Path kept a stress and took `trials` (steps,) for it:
+    the square root of their mean over that of the fit, halfway between the two."""
+    before = (path.strain <= stops_rising(path)) & (trials > 0)
+    return math.sqrt(trials[before].mean() / evaluations(spheres, inertial_number, tolerance, False))
+
+
 def steps_of_a_trial(needed, min_steps, strained):
     """Mean DEM steps of a point's trial where the strain of the body goes into the share `strained` of it."""
     return strained * np.maximum(min_steps, needed / strained) + (1 - strained) * min_steps
@@ -203,7 +211,8 @@ def cost_of_run(path, points, spheres, inertial_number, tolerance, min_steps, st
     """Cost of a run of one step for each step of the Path; from where the stress stops rising the share `strained` of the
     points strains. step_seconds: of a DEM step of one point."""
     past = path.strain > stops_rising(path)
-    number = np.where(past, *(evaluations(spheres, inertial_number, tolerance, when) for when in (True, False)))
+    after, before = (evaluations(spheres, inertial_number, tolerance, when) for when in (True, False))
+    number = np.where(past, after, max(1.0, path.eased * before))
     trial = np.where(past, *(steps_of_a_trial(path.steps_needed, min_steps, share) for share in (strained, 1.0)))
     number, trial = number[1:], trial[1:]  # the first row is the start
     steps = float(points * (number * trial).sum())

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from advice import (
-    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, Differences, band_thickness, cost_of_run, elastic_until,
+    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, Differences, band_thickness, cost_of_run, eased_by, elastic_until,
     loading_path, mean_path, modulus_for, path_of, rate_for, scatter, scatter_constant, softening, spheres_for,
     stops_rising, strained_share, toml_value, tolerance_for, with_values,
 )
@@ -88,7 +88,10 @@ class Probes:
         self.reached = float(history["load_factor"][-1])
         if self.reached < 0.5 and self.paths:
             raise AdviceError(f"the probe {name} ended {self.reached:.0%} along the path: {self.summary['message']}")
-        path = path_of(history, self.effective["ve"]["inertial_number"])
+        ve = self.effective["ve"]
+        path = path_of(history, ve["inertial_number"])
+        if any(key.startswith("stress") for segment in self.path for key in segment):
+            path.eased = eased_by(path, history["evaluations"], self.manifest["spheres"], ve["inertial_number"], self.effective["solver"]["tolerance"])
         print(f"  {name}: {path.dem_steps} DEM steps of {1e6 * path.step_seconds:.0f} us", flush=True)
         return path
 

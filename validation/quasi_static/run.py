@@ -5,9 +5,11 @@
 
 The biaxial of validation/solver (second gradient) on 4 x 8 elements, increments of 1e-3 of axial strain, tolerance 5e-3. The
 name of a row: spheres, inertial number, answer (end; mean; late: the mean that belongs to 2/3 of the step), then what is not
-as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment). Row `yade_alone`: element_rates.py.
+as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment). Rows `yade_alone`, `samples`: element_rates.py,
+samples.py.
 """
 
+import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -54,7 +56,10 @@ KEYS = [
     *(Key(1000, number, answer, increment=part) for number in NUMBERS for answer in ("end", "mean") for part in ("half", "quarter")),
 ]
 ROWS = {key.name(): key for key in KEYS}
-YADE_ALONE = "yade_alone"  # single volume elements
+OTHERS = {
+    "yade_alone": "single volume elements: YADE alone, the element with the end and with the mean, at four rates",
+    "samples": "a stress in every so many DEM steps: what it costs, what it changes",
+}
 
 
 def settings(key, strain):
@@ -179,9 +184,12 @@ def write_choice(c, runs):
 
 def work(c, chosen, strain, as_they_are):
     lines, curves, runs = [], [], {}
-    if YADE_ALONE in chosen and not as_they_are:
+    if "yade_alone" in chosen and not as_they_are:
         element_rates.write(c)
-    for name in (n for n in chosen if n != YADE_ALONE):
+    if "samples" in chosen and not as_they_are:
+        said = subprocess.run(["/usr/bin/python3", HERE / "samples.py", c.program.parent], env=campaign.ENVIRONMENT, check=True, capture_output=True, text=True)
+        c.table([line for line in said.stdout.splitlines() if line.startswith("|")], mark="samples")
+    for name in (n for n in chosen if n not in OTHERS):
         run = c.as_it_is(name) if as_they_are else c.run(CASE, name, *settings(ROWS[name], strain), c.cache, checkpoint_every=10)
         cells = run and measure(run)
         if not cells:
@@ -204,7 +212,7 @@ def main():
     parser.add_argument("--strain", type=float, default=0.03, help="axial strain of the end")
     parser.add_argument("--as-they-are", action="store_true", help="table and figure of the runs that there are")
     a = parser.parse_args()
-    rows = ROWS | {YADE_ALONE: "single volume elements: YADE alone, the element with the end and with the mean, at four rates"}
+    rows = ROWS | OTHERS
     chosen = a.rows or list(rows)
     return campaign.main(HERE, a, rows, lambda c: work(c, chosen, a.strain, a.as_they_are), on_meshes=True)
 
