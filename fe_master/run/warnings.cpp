@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kElementsForForce = 4, kElementsForWidth = 14;  // across the band, on the bilinear bar
 constexpr double kVeSoftening = 1.4;                             // |a| / sigma_0
+constexpr double kSlow = 3e-3;                                   // inertial number (validation/quasi_static)
 
 /// The most negative eigenvalue over the directions, and the elastic modulus along its eigenvector.
 BandModuli least_moduli(const Tensor4& tangent, const Tensor4& elastic) {
@@ -131,6 +132,14 @@ void warn_of_identical_points(const Case& c, const BandModuli& moduli, std::vect
       moduli.softening, is_volume_element(c) ? "ve" : "material"));
 }
 
+void warn_of_rough_answers(const Case& c, std::vector<std::string>& out) {
+  if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlow) return;
+  out.push_back(fmt::format(
+      "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: twice the "
+      "evaluations and more, and rejected steps; set ve.answer = \"mean\"",
+      c.ve.inertial_number));
+}
+
 /// Components (x, y, 11, 12, 21, 22) that a case prescribes on an edge.
 std::size_t prescribed_components(const Case& c, const std::string& edge) {
   std::set<std::pair<bool, Component>> components;
@@ -185,6 +194,7 @@ std::vector<std::string> warnings(const Case& c, const Mesh& mesh) {
   warn_of_coarse_mesh(c, mesh, moduli, out);
   warn_of_identical_points(c, moduli, out);
   warn_of_multiplier(c, mesh, out);
+  warn_of_rough_answers(c, out);
   return out;
 }
 

@@ -124,5 +124,16 @@ TEST(Warnings, UndeterminedMultiplierIsSaid) {
   EXPECT_TRUE(says(warnings(c, mesh), "undetermined"));
 }
 
+TEST(Warnings, SlowTrialsThatAnswerWithTheirEnd) {
+  Case c = softening_case(0.05);
+  c.material.type = MaterialType::volume_element;
+  const Mesh mesh = rectangle_mesh(1, 2, 8, 16);
+  EXPECT_FALSE(says(warnings(c, mesh), "rough function")) << "the usual rate";
+  c.ve.inertial_number = 2e-3;
+  EXPECT_TRUE(says(warnings(c, mesh), "ve.answer = \"mean\""));
+  c.ve.answer = VeAnswer::mean;
+  EXPECT_FALSE(says(warnings(c, mesh), "rough function"));
+}
+
 }  // namespace
 }  // namespace femxdem
