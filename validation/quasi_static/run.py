@@ -153,7 +153,8 @@ def draw(curves, file):
             axis.plot(100 * strain, force, style, color=f"C{NUMBERS.index(key.number)}", linewidth=0.8, label=None if label in labelled else label)
             labelled.add(label)
         axis.set(xlabel="axial strain [%]", title=f"{mesh} elements, {spheres} spheres")
-        axis.legend(fontsize=6)
+        if labelled:
+            axis.legend(fontsize=6)
     axes[0].set(ylabel="force / (sigma_0 W)")
     figure.savefig(file, dpi=90, bbox_inches="tight")
 
