@@ -25,7 +25,7 @@ ANSWERS = {"end": (), "mean": ('ve.answer="mean"',)}
 
 
 def curves_of(c, path, seed, rate):
-    """Axial stress over sigma_0 on the grid of the path: {"YADE", "end", "mean"}."""
+    """(strain, axial stress over sigma_0) of the path: {"YADE", "end", "mean"}, without what does not come to its end."""
     case = cross_yade.case_file(c, LAW, seed, path, SPHERES)
     state, manifest = cross_yade.packing(c.program, cross_yade.case_file(c, LAW, seed, PATHS["biaxial"], SPHERES))
     name = f"{path.name}_{rate:g}_{seed}"
@@ -39,9 +39,10 @@ def curves_of(c, path, seed, rate):
     columns = {"YADE": read_columns(table)}
     for answer, settings in ANSWERS.items():
         element = c.path(case, f"{answer}/{name}", f"ve.inertial_number={rate}", *settings)
-        if element.status != 0:
-            raise campaign.CampaignError(f"{element.folder}: {element.last_words()}")
-        columns[answer] = element.history()
+        if element.status == 0:
+            columns[answer] = element.history()
+        else:
+            print(f"{element.folder}: {element.last_words()}", flush=True)
     return {series: axial(columns[series], series, path) for series in columns}
 
 
@@ -58,10 +59,11 @@ def write(c):
         found = {rate: [curves_of(c, PATHS[name], seed, rate) for seed in SEEDS] for rate in RATES}
         for what, of in (("peak", lambda strain, stress: stress.max()), ("at 3 %", lambda strain, stress: np.interp(0.03, strain, stress))):
             for series in ("YADE", *ANSWERS):
-                values = np.array([[of(*curves[series]) for curves in found[rate]] for rate in RATES])
+                values = np.array([[of(*curves[series]) if series in curves else np.nan for curves in found[rate]] for rate in RATES])
                 mean, error = values.mean(axis=1), values.std(axis=1, ddof=1) / np.sqrt(len(SEEDS))
-                zero = np.array([np.polyfit(RATES, of_seed, 1)[1] for of_seed in values.T])
-                cells = [f"{m:.3f} +- {e:.3f}" for m, e in zip(mean, error)]
+                cells = [f"{m:.3f} +- {e:.3f}" if np.isfinite(m) else "not converged" for m, e in zip(mean, error)]
+                known = np.isfinite(mean)
+                zero = np.array([np.polyfit(np.array(RATES)[known], of_seed[known], 1)[1] for of_seed in values.T])
                 cells.append(f"{zero.mean():.3f} +- {zero.std(ddof=1) / np.sqrt(len(SEEDS)):.3f}")
                 lines.append(f"| {name.replace('_', ' ')} | {what}, {'YADE alone' if series == 'YADE' else 'element, ' + series} | " + " | ".join(cells) + " |")
                 print(lines[-1], flush=True)
