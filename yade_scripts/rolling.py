@@ -7,7 +7,9 @@ from contact_loop import values
 
 def stiffness(c):
     """kr and ktw of the contacts `c` (contact_loop.Contacts), (m, 1) each [N m], 0 where a law has none; None where all are."""
-    acts = _acts(c)
+    from yade.wrapper import Omega
+
+    acts = np.array(_acts(Omega(), c.phys), dtype=bool)
     found = []
     for name in ("kr", "ktw"):
         known = all(hasattr(p, name) for p in c.phys)
@@ -16,13 +18,11 @@ def stiffness(c):
     return tuple(found) if any(k.any() for k in found) else None
 
 
-def _acts(c):
-    """(m,) whether a contact's law has moments: YADE fills kr and ktw of CohFrictPhys where momentRotationLaw is off too."""
-    from yade.wrapper import Omega
-
-    if any(getattr(law, "always_use_moment_law", False) for law in _laws(Omega())):
-        return np.full(len(c.phys), True)
-    return np.array([getattr(p, "momentRotationLaw", True) for p in c.phys], dtype=bool)
+def _acts(O, phys):
+    """Whether the law of each contact has moments: YADE fills kr and ktw of CohFrictPhys where momentRotationLaw is off too."""
+    if any(getattr(law, "always_use_moment_law", False) for law in _laws(O)):
+        return [True] * len(phys)
+    return [getattr(p, "momentRotationLaw", True) for p in phys]
 
 
 def _laws(O):
@@ -31,12 +31,8 @@ def _laws(O):
 
 def pass_moments(O):
     """Whether a contact of the scene passes a moment that its rotation calls for."""
-    always = any(getattr(law, "always_use_moment_law", False) for law in _laws(O))
-    for i in O.interactions:
-        p = i.phys
-        if any(getattr(p, name, 0) > 0 for name in ("kr", "ktw", "mR")) and (always or getattr(p, "momentRotationLaw", True)):
-            return True
-    return False
+    phys = [i.phys for i in O.interactions]
+    return any(acts and any(getattr(p, name, 0) > 0 for name in ("kr", "ktw", "mR")) for p, acts in zip(phys, _acts(O, phys)))
 
 
 def take_moments(O):

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "seconds_since.hpp"
+
 namespace femxdem {
 namespace {
 
@@ -58,7 +60,7 @@ void Log::print(std::string_view text) {
 }
 
 double Log::seconds_left(double done) {
-  const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const double elapsed = seconds_since(start_);
   return elapsed * (1 - done) / (done - done_at_start_);
 }
 

@@ -14,6 +14,7 @@
 #include "packet.hpp"
 #include "rank_service.hpp"
 #include "schedule.hpp"
+#include "seconds_since.hpp"
 
 namespace femxdem {
 
@@ -100,7 +101,7 @@ std::vector<Response> VolumeElements::evaluate(std::span<const Tensor2> F, Opera
     if (rank > 0) statistics_.bytes += inputs[rank].size() + answers[rank].size();
   }
   distinct_ = histories_.trial(F);
-  count(responses, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  count(responses, seconds_since(start));
   return responses;
 }
 
@@ -299,7 +300,7 @@ std::size_t VolumeElements::move_to(const std::vector<int>& owner) {
   }
   const auto start = std::chrono::steady_clock::now();
   command(communicator_, Order::exchange, inputs, local_);
-  statistics_.move_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  statistics_.move_seconds += seconds_since(start);
   statistics_.moved += static_cast<long>(moved);
   return moved;
 }

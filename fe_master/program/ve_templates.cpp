@@ -17,6 +17,7 @@
 #include "locations.hpp"
 #include "manifest.hpp"
 #include "output_folder.hpp"
+#include "seconds_since.hpp"
 
 namespace femxdem {
 namespace {
@@ -141,7 +142,7 @@ std::vector<std::string> make_templates(PythonVolumeElements& elements, const st
       std::string specification = ve_spec_json(ve);
       if (compare > 0) specification.insert(1, fmt::format("\"compare\": {}, ", compare));
       cached.made = elements.make_template(specification);
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const double seconds = seconds_since(start);
       store(files, *cached.made);
       say(fmt::format("{}: made in {:.1f} s, {}", which, seconds, files.state.string()));
     }

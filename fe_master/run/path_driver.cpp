@@ -11,6 +11,7 @@
 
 #include "errors.hpp"
 #include "point_fields.hpp"
+#include "seconds_since.hpp"
 
 namespace femxdem {
 namespace {
@@ -204,7 +205,7 @@ bool PathDriver::evaluate(const Tensor2& F, PathStep& step) {
   trial_F_ = F;
   trial_ = point_.evaluate(std::array{F}, Operator::none).front();
   PathIteration& now = step.table.back();
-  now.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  now.seconds = seconds_since(start);
   if (trial_.failure) {
     step.failure = trial_.failure;
     step.reason = trial_.failure->sentence;

@@ -16,6 +16,7 @@
 #include "log.hpp"
 #include "named_arrays.hpp"
 #include "output_folder.hpp"
+#include "seconds_since.hpp"
 #include "summary.hpp"
 
 namespace femxdem {
@@ -54,7 +55,7 @@ class RunFiles {
   /// Writes the summary and says the message. Returns the status.
   int finish(int status, const std::string& message);
   /// Wall time since the start [s].
-  double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  double wall() const { return seconds_since(start_); }
 
   /// What a full disk leaves: how the run ended, if it still finds a place. Returns the sentence.
   std::string stopped_by_the_disk(const std::string& reason);

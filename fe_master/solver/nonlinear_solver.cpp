@@ -10,15 +10,12 @@
 #include <random>
 
 #include "errors.hpp"
+#include "seconds_since.hpp"
 
 namespace femxdem {
 namespace {
 
 constexpr double kGapTolerance = 1e-2;  // of the second-gradient constraint, over the step's micro gradient
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::vector<Tensor2> stresses(const std::vector<Response>& responses) {
   std::vector<Tensor2> values;
