@@ -305,6 +305,12 @@ void check_solver(const Case& c, Mistakes& m) {
   if (c.solver.reuse_below > 0 && volume_elements(c) && c.ve.answer == VeAnswer::mean)
     m.add("solver.reuse_below",
           "solver.reuse_below is for answers of a trial's end; set ve.answer = \"end\", or reuse_below = 0");
+  if (c.solver.last_correction == LastCorrection::learned &&
+      (c.solver.global_operator != GlobalOperator::quasi_newton || c.solver.line_search ||
+       c.solver.acceleration != Acceleration::none))
+    m.add("solver.last_correction",
+          "solver.last_correction = \"learned\" needs learned tangents and whole corrections; set solver.operator = "
+          "\"quasi_newton\", line_search = false and acceleration = \"none\", or last_correction = \"evaluated\"");
   if (c.solver.qn_min >= c.solver.qn_max) m.add("solver.qn_min", "solver.qn_min is not below qn_max; lower it");
 }
 
@@ -324,6 +330,7 @@ void check_monitors(const Case& c, const std::optional<std::set<std::string>>& e
                     const std::set<std::string>& regions, Mistakes& m) {
   std::set<std::string> names = {"step", "time", "load_factor", "iterations", "evaluations", "dem_steps", "residual"};
   if (c.solver.reuse_below > 0) names.insert({"reused", "reuse_error"});
+  if (c.solver.last_correction == LastCorrection::learned) names.insert("learned_end");
   for (std::size_t i = 0; i < c.monitors.size(); ++i) {
     const std::string key = fmt::format("monitor.{}", i);
     const std::string& name = c.monitors[i].name;

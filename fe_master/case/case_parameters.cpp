@@ -287,6 +287,9 @@ Section<SolverParameters> solver_section() {
                  "force residual / reactions and loads; default 5e-3 for volume elements, 1e-8 for closed forms"),
        parameter("displacement_tolerance", &S::displacement_tolerance, "", kPositive,
                  "correction / displacement of the step; default 0.1 for volume elements, 1e-6 for closed forms"),
+       word("last_correction", &S::last_correction, {"evaluated", "learned"},
+            "learned: where what a correction leaves is known from the steps before to be within the tolerance, points "
+            "answer to the last one from their learned tangents, unevaluated"),
        parameter("max_iterations", &S::max_iterations, "", kAtLeastOne, "then the step is cut"),
        parameter("accept_best_factor", &S::accept_best_factor, "", kAtLeastOne,
                  "the best iterate is accepted, and flagged, below this times the tolerance"),

@@ -39,8 +39,10 @@ class TimeLoop {
   std::string stopped();
   std::string place(std::size_t point) const;
   bool reuses() const { return case_.solver.reuse_below > 0; }
+  bool learns_ends() const { return case_.solver.last_correction == LastCorrection::learned; }
   std::vector<std::string> columns() const;
   std::string reuse_account() const;
+  std::string learned_ends_account() const;
 
   Problem& problem_;
   const Case& case_;
@@ -59,6 +61,7 @@ class TimeLoop {
     long answers = 0;
     double error = 0;  // largest that was accepted
   } reuse_, reuse_of_step_;
+  int learned_ends_ = 0;  // steps whose last correction was answered by learned tangents
   EndRequest end_request_;
   std::string end_reason_;  // why it is to end now
   Checkpoint state_;        // of the last converged step, without that of the points
@@ -109,11 +112,12 @@ int TimeLoop::go() {
     }
     const int status = advance();
     const double time = solver_.time();
-    const std::string message =
-        status == kDone       ? fmt::format("{} steps to time {:g}{}", files_.summary.steps, time, reuse_account())
-        : status == kRunAgain ? stopped()
-                              : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
-                                            files_.summary.steps, time, options_.folder.string(), last_.reason);
+    const std::string message = status == kDone ? fmt::format("{} steps to time {:g}{}{}", files_.summary.steps, time,
+                                                              learned_ends_account(), reuse_account())
+                                : status == kRunAgain
+                                    ? stopped()
+                                    : fmt::format("stopped after step {} (time {:g}), all steps up to it are in {}: {}",
+                                                  files_.summary.steps, time, options_.folder.string(), last_.reason);
     return files_.finish(status, message);
   } catch (const DiskError& error) {
     throw DiskError(files_.stopped_by_the_disk(error.what()));
@@ -198,6 +202,8 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
     record_.monitors.push_back(static_cast<double>(reuse_of_step_.answers));
     record_.monitors.push_back(reuse_of_step_.error);
   }
+  learned_ends_ += last_.learned_at_end;
+  if (learns_ends()) record_.monitors.push_back(last_.learned_at_end);
   reuse_ = {reuse_.answers + reuse_of_step_.answers, std::max(reuse_.error, reuse_of_step_.error)};
   files_.add(record_);
   files_.log.step(record_, table, done);
@@ -220,6 +226,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
 std::vector<std::string> TimeLoop::columns() const {
   std::vector<std::string> names = monitor_names(case_);
   if (reuses()) names.insert(names.end(), {"reused", "reuse_error"});
+  if (learns_ends()) names.push_back("learned_end");
   return names;
 }
 
@@ -229,6 +236,11 @@ std::string TimeLoop::reuse_account() const {
   const double answers = static_cast<double>(files_.summary.evaluations) * static_cast<double>(points_.size());
   return fmt::format("; {:.1f} % of the answers from learned tangents, their error at most {:.1e} of the forces",
                      100 * static_cast<double>(reuse_.answers) / answers, reuse_.error);
+}
+
+/// How many steps have ended without an evaluation of the last correction.
+std::string TimeLoop::learned_ends_account() const {
+  return learns_ends() ? fmt::format("; the last correction of {} of them by learned tangents", learned_ends_) : "";
 }
 
 std::string TimeLoop::place(std::size_t point) const {
@@ -253,6 +265,8 @@ void TimeLoop::keep_state() {
   files_.save(state_.arrays);
   if (reuses())
     state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
+  if (learns_ends())
+    state_.arrays.emplace_back("run.learned_ends", std::vector<double>{static_cast<double>(learned_ends_)});
 }
 
 void TimeLoop::write_state() {
@@ -311,6 +325,7 @@ void TimeLoop::restart() {
     const auto& reuse = find_array(then.arrays, "run.reuse");
     reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
   }
+  if (learns_ends()) learned_ends_ = static_cast<int>(find_array(then.arrays, "run.learned_ends").at(0));
   files_.log.start_from(then.time / case_.control.end_time);
   files_.log.say(fmt::format("restart after step {} (time {:g})", then.step, then.time));
   resumed_ = {};

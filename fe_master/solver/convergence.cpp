@@ -12,8 +12,10 @@ namespace {
 constexpr double kDivergence = 1e3;  // growth over the first residual and over the tolerance
 constexpr double kSame = 1e-9;       // relative difference of residuals that repeat themselves
 constexpr std::size_t kLongestCycle = 4;
-constexpr std::size_t kWindow = 6;  // last residuals that are looked at for a verdict
-constexpr double kProgress = 0.7;   // a least residual above this times the earlier one is no progress
+constexpr std::size_t kWindow = 6;         // last residuals that are looked at for a verdict
+constexpr double kForgottenInAStep = 0.2;  // of what is known about contraction
+constexpr double kNear = 4;                // times the tolerance: residuals from which contraction is learned
+constexpr double kProgress = 0.7;          // a least residual above this times the earlier one is no progress
 
 bool same(double a, double b) { return std::abs(a - b) <= kSame * std::max(a, b); }
 
@@ -63,6 +65,37 @@ std::string ResidualHistory::verdict() const {
   if (residuals_.back() > 10 * least()) return "diverges " + spent;
   if (progress) return "converges too slowly " + spent;
   return "stagnates " + spent;
+}
+
+bool Contraction::near(double residual) const { return residual > 0 && residual <= kNear * tolerance_; }
+
+void Contraction::begin_step() {
+  last_ = 0;
+  seen_ *= 1 - kForgottenInAStep;
+  ratio2_ *= 1 - kForgottenInAStep;
+}
+
+void Contraction::add(double residual) {
+  if (near(last_)) {
+    seen_ += 1;
+    ratio2_ += std::pow(residual / last_, 2);
+  }
+  last_ = residual;
+}
+
+std::optional<double> Contraction::after(double residual) const {
+  if (seen_ < 1 || !near(residual)) return std::nullopt;
+  return std::sqrt(ratio2_ / seen_) * residual;
+}
+
+void Contraction::save(NamedArrays& arrays) const {
+  arrays.emplace_back("solver.contraction", std::vector<double>{seen_, ratio2_});
+}
+
+void Contraction::load(const NamedArrays& arrays) {
+  const auto& values = find_array(arrays, "solver.contraction");
+  seen_ = values.at(0);
+  ratio2_ = values.at(1);
 }
 
 }  // namespace femxdem

@@ -80,6 +80,8 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       last_{0, lacking_, committed_.multipliers, lacking_, 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
       reuse_(parameters.reuse_below, points.size()),
+      contraction_(parameters.tolerance),
+      lagging_(parameters.last_correction == LastCorrection::learned, points_),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
   assert(parameters.reuse_below == 0 || parameters.answer_at == 1);
   points_.commit();
@@ -106,6 +108,7 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
     now.residual = residual.norm() + now.reuse_error;
     now.element = largest(of_elements(residual));
     history.add(now.residual);
+    contraction_.add(now.residual);
     if (result.reason = history.hopeless(operators_.memoryless()); !result.reason.empty()) break;
     if (now.residual > parameters_.tolerance && search.rejects(now.residual)) {
       now.note = fmt::format("line search: {:.2g} of the change next", search.fraction());
@@ -117,14 +120,14 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
       result.reason = "the matrix of the iteration is singular; hold the body, or take a smaller step";
       break;
     }
-    if (converged(now)) {
+    z = unknowns(trial);
+    if (converged(now) || correct_unevaluated(trial, z + *correction, result)) {
       result.converged = true;
       commit(trial, dt);
       return result;
     }
     if (now.residual - now.reuse_error <= parameters_.tolerance) reuse_.stop();
     if (now.residual <= history.least()) best = trial;
-    z = unknowns(trial);
     change = accelerate.change(z, *correction);
     search.start(now.residual);
     move(trial, z + change);
@@ -135,9 +138,11 @@ StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTar
 
 void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
   points_.begin_step();
-  points_.start_from(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_));
   operators_.begin_step(committed_.F, committed_.responses);
+  points_.start_from(
+      lagging_.begin_step(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_), operators_));
   reuse_.begin_step();
+  contraction_.begin_step();
   factorised_in_step_ = false;
   trial.time = trial_time(dt);
   trial.leaving = (1 - points_.theta()) * lacking_;
@@ -194,7 +199,7 @@ bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
   Iteration& now = result.table.back();
   const auto start = std::chrono::steady_clock::now();
   trial.F = formulation_.deformation(trial.x);
-  const std::vector<Tensor2> asked = reuse_.asked(trial.F);
+  const std::vector<Tensor2> asked = lagging_.asked(reuse_.asked(trial.F));
   trial.responses = points_.evaluate(asked, operators_.wanted());
   ++result.evaluations;
   for (const Response& r : trial.responses) {
@@ -213,6 +218,7 @@ bool NonlinearSolver::evaluate(Equilibrium& trial, StepResult& result) {
     trial.responses = points_.evaluate(trial.F, operators_.wanted());  // the trial to be committed is the last one
   }
   reuse_.answer(trial.F, trial.responses, operators_);
+  lagging_.complete(trial.F, trial.responses);
   trial.internal = assembler_.force(trial.configuration(), stresses(trial.responses));
   trial.external = loads_.external_force(trial.x, trial.time, trial.load_factor);
   result.reused += reuse_.count();
@@ -344,6 +350,34 @@ bool NonlinearSolver::converged(const Iteration& iteration) const {
          iteration.gap <= kGapTolerance;
 }
 
+/// Ends the step with a correction, to z, to which the points answer from their learned tangents, unevaluated, where
+/// the residual that is to be expected so (Contraction) is within the tolerance. Their states stay where they were
+/// evaluated; the next step takes them from there to where the mesh is then. False: nothing has happened.
+bool NonlinearSolver::correct_unevaluated(Equilibrium& trial, const Eigen::VectorXd& z, StepResult& result) {
+  Iteration& now = result.table.back();
+  if (parameters_.last_correction == LastCorrection::evaluated) return false;
+  const std::optional<double> expected = contraction_.after(now.residual);
+  if (!expected || *expected > parameters_.tolerance || now.correction > parameters_.displacement_tolerance)
+    return false;
+  Equilibrium moved = trial;
+  move(moved, z);
+  moved.F = formulation_.deformation(moved.x);
+  for (std::size_t p = 0; p < moved.F.size(); ++p) {
+    Tensor2& stress = moved.responses[p].stress;
+    stress = operators_.predict(p, moved.F[p], trial.F[p], stress);
+  }
+  moved.internal = assembler_.force(moved.configuration(), stresses(moved.responses));
+  moved.external = loads_.external_force(moved.x, moved.time, moved.load_factor);
+  const double residual = *expected + relative_residual(moved), constraints = gap(moved);
+  if (residual > parameters_.tolerance || constraints > kGapTolerance) return false;
+  now.note = fmt::format("residual {:.1e}, its correction by learned tangents", now.residual);
+  now.residual = residual;
+  now.gap = constraints;
+  result.learned_at_end = true;
+  trial = std::move(moved);
+  return true;
+}
+
 /// Takes the best iterate where the case allows it (a factor above 1); the points are strained to it again unless they
 /// are there.
 bool NonlinearSolver::accept_best(Equilibrium& best, StepResult& result) {
@@ -383,7 +417,7 @@ Eigen::VectorXd NonlinearSolver::lacking_at_end(const Equilibrium& trial, double
   end.load_factor = start_load_factor_ =
       target_ ? points_.end(start_load_factor_, trial.load_factor) : loads_.released_factor(end.time);
   end.F = formulation_.deformation(end.x);
-  end.internal = assembler_.force(end.configuration(), MidStepPoints::end_stresses(end.F, end.responses));
+  end.internal = assembler_.force(end.configuration(), lagging_.end_stresses(end.F, end.responses, operators_));
   end.external = loads_.external_force(end.x, end.time, end.load_factor);
   return free_part(end.internal - end.external);
 }
@@ -397,6 +431,7 @@ Eigen::VectorXd NonlinearSolver::free_part(Eigen::VectorXd values) const {
 void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   points_.commit();
   reuse_.commit();
+  lagging_.commit();
   lacking_ = lacking_at_end(trial, dt);
   last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
            trial.external - committed_.external, trial.load_factor - committed_.load_factor};
@@ -414,6 +449,8 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);
   operators_.save(arrays);
   reuse_.save(arrays);
+  if (parameters_.last_correction == LastCorrection::learned) contraction_.save(arrays);
+  lagging_.save(arrays);
   arrays.emplace_back("solver.time", std::vector<double>{committed_.time, last_.dt, committed_.load_factor,
                                                          last_.load_factor, time_, start_load_factor_});
   add(arrays, "solver.x", committed_.x);
@@ -438,6 +475,8 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   formulation_.load(arrays);
   operators_.load(arrays);
   reuse_.load(arrays);
+  if (parameters_.last_correction == LastCorrection::learned) contraction_.load(arrays);
+  lagging_.load(arrays);
   const auto& time = find_array(arrays, "solver.time");
   committed_.time = time.at(0);
   committed_.load_factor = time.at(2);

@@ -10,6 +10,7 @@
 #include "control.hpp"
 #include "convergence.hpp"
 #include "formulation.hpp"
+#include "lagging_states.hpp"
 #include "linear_solver.hpp"
 #include "loads.hpp"
 #include "material_points.hpp"
@@ -37,11 +38,12 @@ struct Iteration {
 /// What became of a step.
 struct StepResult {
   bool converged = false;
-  bool stopped = false;        ///< dropped, because the run is to end
-  bool best_accepted = false;  ///< accepted above the tolerance, below accept_best_factor times it
-  int evaluations = 0;         ///< VE evaluations: every point strained once
-  double dem_steps = 0;        ///< DEM steps of all points
-  long reused = 0;             ///< answers of points from their learned tangents (ReusedAnswers)
+  bool stopped = false;         ///< dropped, because the run is to end
+  bool learned_at_end = false;  ///< its last correction was answered by learned tangents
+  bool best_accepted = false;   ///< accepted above the tolerance, below accept_best_factor times it
+  int evaluations = 0;          ///< VE evaluations: every point strained once
+  double dem_steps = 0;         ///< DEM steps of all points
+  long reused = 0;              ///< answers of points from their learned tangents (ReusedAnswers)
   std::vector<Iteration> table;
   std::string reason;              ///< why it did not converge, one sentence
   std::optional<Failure> failure;  ///< of a point, when that is the reason
@@ -130,6 +132,7 @@ class NonlinearSolver {
   void move(Equilibrium& trial, const Eigen::VectorXd& z);
   AndersonAcceleration acceleration() const;
   bool converged(const Iteration& iteration) const;
+  bool correct_unevaluated(Equilibrium& trial, const Eigen::VectorXd& z, StepResult& result);
   bool accept_best(Equilibrium& best, StepResult& result);
   void give_up(Equilibrium& best, double dt, const ResidualHistory& history, StepResult& result);
   void commit(Equilibrium& trial, double dt);
@@ -159,6 +162,8 @@ class NonlinearSolver {
   std::optional<MeasureTarget> target_;  // of the step under way
   PointOperators operators_;
   ReusedAnswers reuse_;
+  Contraction contraction_;
+  LaggingStates lagging_;
   double penalty_;  // r of the augmented Lagrangian [Pa]
   std::function<bool()> told_to_end_ = [] { return false; };
 };

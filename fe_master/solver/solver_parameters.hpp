@@ -8,6 +8,8 @@ enum class GlobalOperator { quasi_newton, elastic, tangent, perturbation };
 enum class Refresh { frozen, step, iteration };
 enum class Predictor { extrapolate, none };
 enum class Acceleration { none, anderson };
+/// Whether the points are evaluated after the last correction of a step, or answer from their learned tangents.
+enum class LastCorrection { evaluated, learned };
 struct SolverParameters {
   GlobalOperator global_operator = GlobalOperator::quasi_newton;
   Refresh refresh = Refresh::step;  ///< when the elastic operator is asked for anew
@@ -15,6 +17,7 @@ struct SolverParameters {
   Predictor predictor = Predictor::extrapolate;
   double tolerance = kNotGiven;               ///< force residual / reaction and external scale [-]
   double displacement_tolerance = kNotGiven;  ///< correction / displacement of the step [-]
+  LastCorrection last_correction = LastCorrection::evaluated;
   int max_iterations = 15;
   double accept_best_factor = 1.0;  ///< best iterate accepted below this times the tolerance, and flagged [-]
   Acceleration acceleration = Acceleration::none;

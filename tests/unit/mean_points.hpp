@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cassert>
+#include <functional>
+#include <random>
 
 #include "analytic_points.hpp"
 
@@ -8,11 +10,12 @@ namespace femxdem {
 
 /// Laws in closed form that answer as volume elements with ve.answer = "mean" do: with the mean of the stress over the
 /// way from the committed F to the trial's, taken in the frame of the material and turned to that of the end. Weight 1
-/// + late (2 t / T - 1), late = 6 theta - 3. theta = 1: the stress of the end.
+/// + late (2 t / T - 1), late = 6 theta - 3. theta = 1: the stress of the end. noise: of the
+/// stress, by which it jumps from one F to any other.
 class MeanPoints : public MaterialPoints {
  public:
-  MeanPoints(std::vector<AnalyticLaw> laws, double theta)
-      : laws_(std::move(laws)), theta_(theta), late_((6 * theta - 3) / (1 + 2.0 / (kParts * kParts))) {
+  MeanPoints(std::vector<AnalyticLaw> laws, double theta, double noise = 0)
+      : laws_(std::move(laws)), theta_(theta), noise_(noise), late_((6 * theta - 3) / (1 + 2.0 / (kParts * kParts))) {
     for (const AnalyticLaw& law : laws_) committed_.push_back(initial_state(law));
     trial_ = committed_;
   }
@@ -47,18 +50,27 @@ class MeanPoints : public MaterialPoints {
     }
     trial_[p] = state;
     if (theta_ < 1) response.stress = rotate(sum, polar_decomposition(F).R);
+    if (noise_ > 0) response.stress += jump(F) * noise_ * response.stress.norm();
     const Tensor2 end = unrotated(state);
     response.report["end_stress_xx"] = end(0, 0), response.report["end_stress_yy"] = end(1, 1);
     response.report["end_stress_zz"] = end(2, 2), response.report["end_stress_xy"] = end(0, 1);
     response.report["end_stress_yz"] = end(1, 2), response.report["end_stress_zx"] = end(2, 0);
     return response;
   }
+  /// A symmetric tensor of random numbers between -1 and 1, other ones for every F.
+  static Tensor2 jump(const Tensor2& F) {
+    std::size_t bits = 0;
+    for (const double value : F.reshaped()) bits = 31 * bits + std::hash<double>{}(value);
+    std::mt19937_64 generator(bits);
+    const Tensor2 random = Tensor2::NullaryExpr([&] { return 2.0 * static_cast<double>(generator()) / 0x1p64 - 1; });
+    return 0.5 * (random + random.transpose());
+  }
   static Tensor2 unrotated(const LawState& state) {
     return rotate(state.stress, Tensor2(polar_decomposition(state.F).R.transpose()));
   }
 
   std::vector<AnalyticLaw> laws_;
-  double theta_, late_;
+  double theta_, noise_, late_;
   std::vector<LawState> committed_, trial_;
 };
 

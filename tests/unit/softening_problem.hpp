@@ -109,6 +109,20 @@ inline SofteningProblem bilinear_bar(int n, double end, const SolverParameters& 
   return p;
 }
 
+/// A softening law in every point, a weaker one in one spot.
+inline std::vector<AnalyticLaw> softening_laws(const Formulation& element, double hardening) {
+  constexpr double kDegree = 0.017453292519943295;
+  const DruckerPragerLaw law{3e7, 0.2, 5e4, 25 * kDegree, 10 * kDegree, hardening, 1e4, 1e5};
+  DruckerPragerLaw weak = law;
+  weak.cohesion *= 0.8;
+  std::vector<AnalyticLaw> laws(element.points(), law);
+  for (std::size_t i = 0; i < laws.size(); ++i) {
+    const Point2 X = element.shapes(i).X;
+    if (X.x() > 0.25 && X.x() < 0.375 && X.y() > 0.75 && X.y() < 0.875) laws[i] = weak;
+  }
+  return laws;
+}
+
 /// Biaxial test W x H = 1 m x 2 m, nx x 2 nx elements, Drucker-Prager with softening cohesion, sides under sigma_0 =
 /// 1e5 Pa, one region of W / 8 with 20 % less cohesion. D: second-gradient modulus [N], 0: first gradient. The top goes
 /// down by 1e-3 of the height in a time of 1.
@@ -120,16 +134,7 @@ inline SofteningProblem softening_biaxial(int nx, double D, const SolverParamete
   } else {
     p.element = std::make_unique<PlaneStrainQ8>(*p.mesh);
   }
-  constexpr double kDegree = 0.017453292519943295;
-  const DruckerPragerLaw law{3e7, 0.2, 5e4, 25 * kDegree, 10 * kDegree, hardening, 1e4, 1e5};
-  DruckerPragerLaw weak = law;
-  weak.cohesion *= 0.8;
-  std::vector<AnalyticLaw> laws(p.element->points(), law);
-  for (std::size_t i = 0; i < laws.size(); ++i) {
-    const Point2 X = p.element->shapes(i).X;
-    if (X.x() > 0.25 && X.x() < 0.375 && X.y() > 0.75 && X.y() < 0.875) laws[i] = weak;
-  }
-  p.points = std::make_unique<AnalyticPoints>(std::move(laws));
+  p.points = std::make_unique<AnalyticPoints>(softening_laws(*p.element, hardening));
   p.loads = std::make_unique<Loads>(*p.element);
   for (const int node : edge_nodes(*p.mesh, "bottom")) p.loads->prescribe(2 * node + 1, [](double) { return 0.0; });
   for (const int node : edge_nodes(*p.mesh, "top"))

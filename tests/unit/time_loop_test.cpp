@@ -106,6 +106,26 @@ TEST_F(TimeLoopTest, ReusedAnswersAreCountedAndARestartGoesOnWithThem) {
   EXPECT_EQ(rows(folder_), whole);
 }
 
+TEST_F(TimeLoopTest, LearnedEndsAreCountedAndARestartGoesOnWithThem) {
+  Case c = block();
+  c.solver.tolerance = 1e-3;
+  c.solver.displacement_tolerance = 0.3;
+  c.solver.last_correction = LastCorrection::learned;
+  c.output.checkpoint_every = 4;
+  c.loads.back().component = Component::x;  // sheared
+  c.loads.back().value = 0.02;
+  const VonMisesLaw law{1000, 0.25, 2, 50, 0, 0};
+  ASSERT_EQ(run(c, law), kDone);
+  const auto whole = rows(folder_);
+  EXPECT_TRUE(whole.front().ends_with(",learned_end")) << whole.front();
+  const long learned = std::count_if(whole.begin(), whole.end(), [](const auto& row) { return row.ends_with(",1"); });
+  EXPECT_GT(learned, 0);
+  EXPECT_NE(text_of(folder_ / "log.txt").find(fmt::format("; the last correction of {} of them by", learned)),
+            std::string::npos);
+  EXPECT_EQ(run(c, law, Existing::resume), kDone);
+  EXPECT_EQ(rows(folder_), whole);
+}
+
 TEST_F(TimeLoopTest, ResultsAreNotOverwrittenUnasked) {
   const Case c = block();
   ASSERT_EQ(run(c, make_law(c.material)), kDone);

@@ -5,7 +5,8 @@
 
 The biaxial of validation/solver (second gradient) on 4 x 8 elements, increments of 1e-3 of axial strain, tolerance 5e-3. The
 name of a row: spheres, inertial number, answer (end; mean; late: the mean that belongs to 2/3 of the step), then what is not
-as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment). Rows `yade_alone`, `samples`: element_rates.py,
+as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment), learned (a step's last
+correction is answered by learned tangents). Rows `yade_alone`, `samples`: element_rates.py,
 samples.py.
 """
 
@@ -30,6 +31,7 @@ CASE = HERE.parent / "solver" / "biaxial_ve.toml"
 HEIGHT, SIGMA_0, VELOCITY = 2.0, 1e5, 0.1
 NUMBERS = (2e-2, 5e-3, 2e-3, 1e-3, 5e-4)
 ANSWERS = {"end": (), "mean": ('ve.answer="mean"',), "late": ('ve.answer="mean"', "ve.mean_at=0.66666")}
+ENDS = {"": (), "learned": ('solver.last_correction="learned"',)}
 INCREMENTS = {"": 0.02, "half": 0.01, "quarter": 0.005}  # s: 1e-3 of axial strain, ...
 
 
@@ -41,10 +43,11 @@ class Key(NamedTuple):
     mesh: str = "4x8"
     seed: int = 1
     increment: str = ""
+    ending: str = ""
 
     def name(self):
         unusual = [f"{self.damping:g}" * (self.damping != 0.2), self.mesh * (self.mesh != "4x8"),
-                   f"seed{self.seed}" * (self.seed != 1), self.increment]
+                   f"seed{self.seed}" * (self.seed != 1), self.increment, self.ending]
         return "_".join([str(self.spheres), f"{self.number:g}", self.answer, *filter(None, unusual)])
 
 
@@ -54,6 +57,8 @@ KEYS = [
     *(Key(1000, number, answer, mesh="8x16", seed=seed) for number in NUMBERS for answer in ("end", "mean") for seed in (1, 2, 3)),
     *(Key(spheres, number, "mean", seed=seed) for spheres in (200, 1000) for number in NUMBERS for seed in (2, 3)),
     *(Key(1000, number, answer, increment=part) for number in NUMBERS for answer in ("end", "mean") for part in ("half", "quarter")),
+    *(Key(spheres, number, "mean", seed=seed, ending="learned") for spheres in (200, 400, 1000) for number in NUMBERS for seed in (1, 2, 3)),
+    *(Key(1000, number, "mean", mesh="8x16", seed=seed, ending="learned") for number in NUMBERS for seed in (1, 2, 3)),
 ]
 ROWS = {key.name(): key for key in KEYS}
 OTHERS = {
@@ -68,7 +73,7 @@ def settings(key, strain):
     step = INCREMENTS[key.increment]
     mesh = [f"mesh.nx={nx}", f"mesh.ny={ny}", *(["element.D=4e3"] if nx == "4" else []), f"control.end_time={strain * HEIGHT / VELOCITY}"]
     return [*mesh, f"control.step={step}", f"control.max_step={step}", f"ve.spheres={key.spheres}", f"ve.seed={key.seed}",
-            f"ve.inertial_number={key.number}", f"ve.damping={key.damping}", *ANSWERS[key.answer]]
+            f"ve.inertial_number={key.number}", f"ve.damping={key.damping}", *ANSWERS[key.answer], *ENDS[key.ending]]
 
 
 def curve(history):
@@ -146,7 +151,7 @@ def draw(curves, file):
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), sharey=True)
     for axis, (spheres, mesh) in zip(axes, ((200, "4x8"), (1000, "4x8"), (1000, "8x16"))):
         labelled = set()
-        for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment) == (spheres, mesh, "")):
+        for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment, c[0].ending) == (spheres, mesh, "", "")):
             strain, force = curve(history)
             style = "--" if key.answer == "end" else ":" if key.damping != 0.2 else "-"
             label = f"I = {key.number:g}, {key.answer}" + ", damping 0.7" * (style == ":")
@@ -163,7 +168,7 @@ def write_choice(c, runs):
     """Table and figure of what rate, answer and damping cost and err by (choice.py)."""
     plain = {}
     for key, run in runs.items():
-        answer = key.answer + ", damping 0.7" * (key.damping == 0.7)
+        answer = key.answer + ", damping 0.7" * (key.damping == 0.7) + ", learned" * (key.ending == "learned")
         if (key.mesh, key.increment) == ("4x8", "") and answer in choice.MARKERS:
             history = run.history()
             plain[key] = choice.Run(key.spheres, key.number, answer, *curve(history), history["evaluations"][history["step"] > 0],
