@@ -73,11 +73,8 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       prescribed_(loads.prescribed_dofs()),
       assembler_(formulation, prescribed_),
       committed_(undeformed(formulation, points, loads)),
-      start_(committed_.x),
-      start_multipliers_(committed_.multipliers),
-      start_load_factor_(committed_.load_factor),
-      lacking_(Eigen::VectorXd::Zero(formulation.unknowns())),
-      last_{0, lacking_, committed_.multipliers, lacking_, 0},
+      start_{0, committed_.x, committed_.multipliers, committed_.load_factor, committed_.leaving},
+      last_{0, start_.lacking, committed_.multipliers, start_.lacking, 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
       reuse_(parameters.reuse_below, points.size()),
       contraction_(parameters.tolerance),
@@ -87,7 +84,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
   points_.commit();
   committed_.internal = assembler_.force(committed_.configuration(), stresses(committed_.responses));
   committed_.external = loads_.external_force(committed_.x, 0);
-  if (points_.theta() < 1) lacking_ = -free_part(committed_.out_of_balance());
+  if (points_.theta() < 1) start_.lacking = -free_part(committed_.out_of_balance());
 }
 
 StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTarget>& target) {
@@ -140,18 +137,18 @@ void NonlinearSolver::begin_step(Equilibrium& trial, double dt) {
   points_.begin_step();
   operators_.begin_step(committed_.F, committed_.responses);
   points_.start_from(
-      lagging_.begin_step(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_), operators_));
+      lagging_.begin_step(points_.theta() == 1 ? committed_.F : formulation_.deformation(start_.x), operators_));
   reuse_.begin_step();
   contraction_.begin_step();
   factorised_in_step_ = false;
   trial.time = trial_time(dt);
-  trial.leaving = (1 - points_.theta()) * lacking_;
+  trial.leaving = (1 - points_.theta()) * start_.lacking;
   predict(trial, dt);
-  const bool reaches_start = time_ <= parameters_.start_time && time_ + dt > parameters_.start_time;
+  const bool reaches_start = start_.time <= parameters_.start_time && start_.time + dt > parameters_.start_time;
   if (parameters_.start_amplitude > 0 && reaches_start) start_at_random(trial);
 }
 
-double NonlinearSolver::trial_time(double dt) const { return points_.within(time_, time_ + dt); }
+double NonlinearSolver::trial_time(double dt) const { return points_.within(start_.time, start_.time + dt); }
 
 /// Start of the iterations: the last step's increment extrapolated, corrected for the carried residual, the change of
 /// the loads, the prescribed values, and what the step's start lacks, with which its stresses begin; an elastic
@@ -161,7 +158,7 @@ void NonlinearSolver::predict(Equilibrium& trial, double dt) {
   trial.x += factor * last_.x;
   trial.multipliers += factor * last_.multipliers;
   const Eigen::VectorXd target =
-      points_.within<Eigen::VectorXd>(start_(prescribed_), loads_.prescribed(time_, time_ + dt));
+      points_.within<Eigen::VectorXd>(start_.x(prescribed_), loads_.prescribed(start_.time, start_.time + dt));
   Eigen::VectorXd change = Eigen::VectorXd::Zero(formulation_.unknowns());
   for (std::size_t i = 0; i < prescribed_.size(); ++i) {
     change[prescribed_[i]] = target[static_cast<Eigen::Index>(i)] - trial.x[prescribed_[i]];
@@ -169,7 +166,8 @@ void NonlinearSolver::predict(Equilibrium& trial, double dt) {
   trial.load_factor =
       target_ ? committed_.load_factor + factor * last_.load_factor : loads_.released_factor(trial.time);
   const Eigen::VectorXd external = loads_.external_force(trial.x, trial.time, trial.load_factor);
-  const Eigen::VectorXd residual = external + trial.leaving - factor * last_.external - committed_.internal - lacking_;
+  const Eigen::VectorXd residual =
+      external + trial.leaving - factor * last_.external - committed_.internal - start_.lacking;
   if (const auto c = correction(committed_, trial.x, residual, change)) {
     trial.x += c->x;
     trial.load_factor += c->load_factor;
@@ -406,20 +404,19 @@ void NonlinearSolver::give_up(Equilibrium& best, double dt, const ResidualHistor
   }
 }
 
-/// Internal less external forces at the end of the step of this trial, of the stresses there, where nothing is
-/// prescribed.
-Eigen::VectorXd NonlinearSolver::lacking_at_end(const Equilibrium& trial, double dt) {
-  if (points_.theta() == 1) return lacking_;
-  Equilibrium end = trial;
-  end.time = time_ + dt;
-  end.x = points_.end(start_, trial.x);
-  end.multipliers = start_multipliers_ = points_.end(start_multipliers_, trial.multipliers);
-  end.load_factor = start_load_factor_ =
-      target_ ? points_.end(start_load_factor_, trial.load_factor) : loads_.released_factor(end.time);
-  end.F = formulation_.deformation(end.x);
-  end.internal = assembler_.force(end.configuration(), lagging_.end_stresses(end.F, end.responses, operators_));
-  end.external = loads_.external_force(end.x, end.time, end.load_factor);
-  return free_part(end.internal - end.external);
+/// The end of the step of this trial, whose points are committed.
+StepStart NonlinearSolver::end_of(const Equilibrium& trial, double dt) const {
+  StepStart next = start_;
+  next.time += dt;
+  next.x = points_.end(start_.x, trial.x);
+  if (points_.theta() == 1) return next;
+  next.multipliers = points_.end(start_.multipliers, trial.multipliers);
+  next.load_factor = target_ ? points_.end(start_.load_factor, trial.load_factor) : loads_.released_factor(next.time);
+  const std::vector<Tensor2> F = formulation_.deformation(next.x);
+  const Eigen::VectorXd internal =
+      assembler_.force({next.x, next.multipliers, F}, lagging_.end_stresses(F, trial.responses, operators_));
+  next.lacking = free_part(internal - loads_.external_force(next.x, next.time, next.load_factor));
+  return next;
 }
 
 /// A vector of all unknowns with zeros where they are prescribed.
@@ -432,15 +429,14 @@ void NonlinearSolver::commit(Equilibrium& trial, double dt) {
   points_.commit();
   reuse_.commit();
   lagging_.commit();
-  lacking_ = lacking_at_end(trial, dt);
+  StepStart next = end_of(trial, dt);
   last_ = {span(dt), trial.x - committed_.x, trial.multipliers - committed_.multipliers,
            trial.external - committed_.external, trial.load_factor - committed_.load_factor};
   committed_ = std::move(trial);
-  const Eigen::VectorXd end = points_.end(start_, committed_.x);
-  time_ += dt;
-  start_ = end;
-  formulation_.commit(start_);
-  committed_.x += start_ - end;  // unknowns that are increments of a step are counted from the new start
+  const Eigen::VectorXd end = next.x;
+  formulation_.commit(next.x);
+  committed_.x += next.x - end;  // unknowns that are increments of a step are counted from the new start
+  start_ = std::move(next);
 }
 
 void NonlinearSolver::complete_reports() { femxdem::complete_reports(points_, committed_.responses); }
@@ -452,7 +448,7 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
   if (parameters_.last_correction == LastCorrection::learned) contraction_.save(arrays);
   lagging_.save(arrays);
   arrays.emplace_back("solver.time", std::vector<double>{committed_.time, last_.dt, committed_.load_factor,
-                                                         last_.load_factor, time_, start_load_factor_});
+                                                         last_.load_factor, start_.time, start_.load_factor});
   add(arrays, "solver.x", committed_.x);
   add(arrays, "solver.multipliers", committed_.multipliers);
   add(arrays, "solver.last_change", last_.x);
@@ -460,8 +456,8 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
   add(arrays, "solver.last_external_change", last_.external);
   add(arrays, "solver.internal", committed_.internal);
   add(arrays, "solver.leaving", committed_.leaving);
-  add(arrays, "solver.lacking", lacking_);
-  add(arrays, "solver.start_multipliers", start_multipliers_);
+  add(arrays, "solver.lacking", start_.lacking);
+  add(arrays, "solver.start_multipliers", start_.multipliers);
   std::vector<double> answers;
   for (const Response& r : committed_.responses) {
     answers.insert(answers.end(), r.stress.data(), r.stress.data() + 9);
@@ -480,15 +476,12 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   const auto& time = find_array(arrays, "solver.time");
   committed_.time = time.at(0);
   committed_.load_factor = time.at(2);
-  time_ = time.at(4);
-  start_load_factor_ = time.at(5);
-  start_ = formulation_.start();
+  start_ = {time.at(4), formulation_.start(), find_vector(arrays, "solver.start_multipliers"), time.at(5),
+            find_vector(arrays, "solver.lacking")};
   committed_.x = find_vector(arrays, "solver.x");
   committed_.multipliers = find_vector(arrays, "solver.multipliers");
   last_ = {time.at(1), find_vector(arrays, "solver.last_change"), find_vector(arrays, "solver.last_multiplier_change"),
            find_vector(arrays, "solver.last_external_change"), time.at(3)};
-  lacking_ = find_vector(arrays, "solver.lacking");
-  start_multipliers_ = find_vector(arrays, "solver.start_multipliers");
   committed_.leaving = find_vector(arrays, "solver.leaving");
   committed_.F = formulation_.deformation(committed_.x);
   const double* value = find_array(arrays, "solver.responses").data();

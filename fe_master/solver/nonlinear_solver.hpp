@@ -69,6 +69,17 @@ struct Equilibrium {
   Eigen::VectorXd out_of_balance() const { return external + leaving - internal; }
 };
 
+/// What a step starts from: the end of the step before, which lies beyond its equilibrium where answers belong to a
+/// fraction theta < 1 of a step.
+struct StepStart {
+  double time = 0;              ///< [s]
+  Eigen::VectorXd x;            ///< unknowns (Formulation)
+  Eigen::VectorXd multipliers;  ///< of the constraints (Formulation) [Pa]; not used for theta = 1, nor the next two
+  double load_factor = 0;       ///< of the released loads [-]
+  Eigen::VectorXd
+      lacking;  ///< internal less external forces of the stresses there, 0 where prescribed; 0 for theta = 1
+};
+
 /// Equilibrium of the finite elements with their material points, step by step.
 ///
 /// Every trial strains the points from their committed state by the step's total increment; a step that fails leaves
@@ -97,7 +108,7 @@ class NonlinearSolver {
   /// Gives the committed responses their whole reports, which cost volume elements as much as a trial.
   void complete_reports();
   /// The end of the last step [s]: committed().time for theta = 1.
-  double time() const { return time_; }
+  double time() const { return start_.time; }
   /// From the committed equilibrium to that of a step dt [s]: dt for theta = 1.
   double span(double dt) const { return points_.theta() == 1 ? dt : trial_time(dt) - committed_.time; }
   const PointOperators& operators() const { return operators_; }
@@ -114,7 +125,7 @@ class NonlinearSolver {
   double trial_time(double dt) const;
   void begin_step(Equilibrium& trial, double dt);
   void predict(Equilibrium& trial, double dt);
-  Eigen::VectorXd lacking_at_end(const Equilibrium& trial, double dt);
+  StepStart end_of(const Equilibrium& trial, double dt) const;
   Eigen::VectorXd free_part(Eigen::VectorXd values) const;
   void start_at_random(Equilibrium& trial) const;
   bool evaluate(Equilibrium& trial, StepResult& result);
@@ -148,12 +159,8 @@ class NonlinearSolver {
   LinearSolver linear_solver_;
   bool factorised_in_step_ = false;
   Equilibrium committed_;
-  double time_ = 0;        // of the end of the last step
-  Eigen::VectorXd start_;  // unknowns there, and the next three
-  Eigen::VectorXd start_multipliers_;
-  double start_load_factor_ = 0;
-  Eigen::VectorXd lacking_;  // internal less external forces, of the stresses there; 0 for theta = 1
-  struct Increment {         // between the last two equilibria
+  StepStart start_;
+  struct Increment {  // between the last two equilibria
     double dt = 0;
     Eigen::VectorXd x, multipliers, external;
     double load_factor = 0;

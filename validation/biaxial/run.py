@@ -43,6 +43,7 @@ SENSITIVITY = {
     "D_5e3": Row("128.toml", ("element.D=5e3",), "128, twice D"),
     "increment_5e-4": Row("128.toml", ("control.step=0.01", "control.max_step=0.01"), "128, half of the increment"),
     "increment_2e-3": Row("128.toml", ("control.step=0.04", "control.max_step=0.04"), "128, twice the increment"),
+    "last_correction": Row("128.toml", ("solver.last_correction=learned",), "128, a step's last correction answered by learned tangents"),
     "paper_law": Row("128.toml", ("ve.contact_law=paper",), "128, the paper's contact law to the letter"),
     "paper_law_everywhere": Row("128.toml", ("ve.contact_law=paper", "ve.new_contacts=adhesive"), "the same, adhesion on every contact"),
     "authors_contacts": Row("128.toml", AUTHORS_CONTACTS, "the same, with dashpots for the local damping: the authors' contact switches"),

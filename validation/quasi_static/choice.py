@@ -11,7 +11,7 @@ import numpy as np
 
 AT = np.linspace(0.002, 0.049, 95)  # axial strain
 READ = ("peak", "at 3 %", "curve")
-MARKERS = {"end": "s", "mean": "o", "mean, damping 0.7": "^", "mean, learned": "v"}
+MARKERS = {"end": "s", "mean": "o", "mean, damping 0.7": "^", "mean, learned": "v", "end, learned": "D"}
 
 
 @dataclass

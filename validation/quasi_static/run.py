@@ -57,7 +57,8 @@ KEYS = [
     *(Key(1000, number, answer, mesh="8x16", seed=seed) for number in NUMBERS for answer in ("end", "mean") for seed in (1, 2, 3)),
     *(Key(spheres, number, "mean", seed=seed) for spheres in (200, 1000) for number in NUMBERS for seed in (2, 3)),
     *(Key(1000, number, answer, increment=part) for number in NUMBERS for answer in ("end", "mean") for part in ("half", "quarter")),
-    *(Key(spheres, number, "mean", seed=seed, ending="learned") for spheres in (200, 400, 1000) for number in NUMBERS for seed in (1, 2, 3)),
+    *(Key(spheres, number, answer, seed=seed, ending="learned") for spheres in (200, 400, 1000) for number in NUMBERS
+      for answer in ("end", "mean") for seed in (1, 2, 3)),
     *(Key(1000, number, "mean", mesh="8x16", seed=seed, ending="learned") for number in NUMBERS for seed in (1, 2, 3)),
 ]
 ROWS = {key.name(): key for key in KEYS}

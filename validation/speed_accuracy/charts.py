@@ -72,6 +72,7 @@ def point():
         "learned tangents": (),
         "learned, pairs met exactly": ("solver.qn_first=0", "solver.qn_scatter=0"),
         "learned, relaxed start": ('ve.stiffness="relaxed"',),
+        "learned, last correction too": ('solver.last_correction="learned"',),
         "elastic, Eq. (2)": elastic,
         "elastic, relaxed": (*elastic, 've.stiffness="relaxed"', 'solver.refresh="frozen"'),  # anew in every step: 2 s of each
         "elastic, Anderson": (*elastic, "solver.acceleration=anderson", "solver.anderson_depth=8"),
@@ -82,10 +83,10 @@ def point():
     }
     rows = [Setting(f"{name}, 5e-3", (*words, *tolerance(5e-3)), packings=(1,) if name == "perturbation" else (1, 2))
             for name, words in operators.items()]
-    rows += [Setting(f"{name}, 1e-2", (*operators[name], *tolerance(1e-2))) for name in ("learned tangents", "elastic, relaxed", "reuse below 0.03")]
+    rows += [Setting(f"{name}, 1e-2", (*operators[name], *tolerance(1e-2))) for name in ("learned tangents", "learned, last correction too", "elastic, relaxed", "reuse below 0.03")]
     rows += [Setting(f"learned tangents, {t}", tolerance(float(t))) for t in ("1e-3", "2e-4")]
     rows.append(Setting("learned tangents, 1e-4", tolerance(1e-4), packings=(1,)))
-    of_laws = {name: operators[name] for name in ("learned tangents", "elastic, Eq. (2)", "elastic, Anderson", "perturbation")}
+    of_laws = {name: operators[name] for name in ("learned tangents", "learned, last correction too", "elastic, Eq. (2)", "elastic, Anderson", "perturbation")}
     of_laws |= {"consistent tangent": ("solver.operator=tangent",), "consistent, line search": ("solver.operator=tangent", "solver.line_search=true")}
     rows += [Setting(f"{name}, 5e-3", (*words, "solver.tolerance=5e-3"), "law", (None,)) for name, words in of_laws.items()]
     rows += [Setting(f"learned tangents, {t}", (f"solver.tolerance={t}",), "law", (None,)) for t in ("5e-4", "5e-5")]
