@@ -169,11 +169,12 @@ Checkpoint CheckpointFile::read(const std::map<std::string, std::string>& versio
 
 StateSource CheckpointFile::states() const {
   StateSource source;
-  for (const auto& [numbers, place] : {std::pair{&source.number_of_point, "/state_of_point"},
-                                       std::pair{&source.history_of_point, "/history_of_point"}}) {
-    for (const double number : read_or_refuse([&] { return h5_->read(place); }))
-      numbers->push_back(static_cast<int>(number));
-  }
+  const auto numbers = [this](const char* place) {
+    const std::vector<double> values = read_or_refuse([&] { return h5_->read(place); });
+    return std::vector<int>(values.begin(), values.end());
+  };
+  source.number_of_point = numbers("/state_of_point");
+  source.history_of_point = numbers("/history_of_point");
   source.read = [this](int number) { return read_or_refuse([&] { return h5_->read_bytes(place_of(number)); }); };
   return source;
 }
