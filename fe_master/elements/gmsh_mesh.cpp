@@ -1,14 +1,8 @@
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <gmsh.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
-#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <set>
@@ -17,6 +11,7 @@
 #include "mesh.hpp"
 #include "mesh_gaps.hpp"
 #include "msh2_file.hpp"
+#include "own_process.hpp"
 
 namespace femxdem {
 
@@ -263,30 +258,6 @@ Mesh opened(const std::string& file) {
   return read_model(file);
 }
 
-/// Damaged files end Gmsh's library by a signal, or never: it reads them first in a process of its own.
-void refuse_what_ends_gmsh(const std::string& file) {
-  constexpr unsigned kLongest = 1800;  // [s]
-  const pid_t child = fork();
-  if (child < 0) return;
-  if (child == 0) {
-    for (const int number : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGALRM}) std::signal(number, SIG_DFL);
-    alarm(kLongest);
-    if (const int nothing = open("/dev/null", O_WRONLY); nothing >= 0) dup2(nothing, STDERR_FILENO);
-    try {
-      opened(file);
-    } catch (...) {  // it is said by the process that reads the file for good
-    }
-    _exit(0);
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (WIFSIGNALED(status))
-    throw UserError(fmt::format(
-        "{}: Gmsh cannot read it (its library ends with signal {}, {}); open it in Gmsh and export it again", file,
-        WTERMSIG(status), strsignal(WTERMSIG(status))));
-}
-
 }  // namespace
 
 Mesh gmsh_mesh(const std::string& file) {
@@ -294,7 +265,9 @@ Mesh gmsh_mesh(const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension().string();
   if (extension != ".msh" && extension != ".geo")
     throw UserError(fmt::format("{}: not a Gmsh file by its name; give a mesh (.msh) or a geometry (.geo)", file));
-  refuse_what_ends_gmsh(file);
+  if (const auto end = what_ends([&] { opened(file); }))
+    throw UserError(fmt::format(
+        "{}: Gmsh cannot read it (its library ends with {}); open it in Gmsh and export it again", file, *end));
   try {
     return opened(file);
   } catch (const std::string& error) {  // what Gmsh's API throws

@@ -9,6 +9,7 @@
 
 #include "disk_file.hpp"
 #include "errors.hpp"
+#include "own_process.hpp"
 #include "sealed_file.hpp"
 
 namespace femxdem {
@@ -133,7 +134,15 @@ CheckpointFile::CheckpointFile(const fs::path& file) : file_(file) {
   const std::string name = file.string();
   if (!fs::exists(file)) throw UserError(fmt::format("{}: no checkpoint to restart from{}", name, offer(file)));
   if (const auto fault = broken_seal(file)) throw UserError(fmt::format("{}: {}{}", name, *fault, offer(file)));
-  h5_ = read_or_refuse([&] { return std::make_unique<Hdf5File>(file, Hdf5File::Mode::read); });
+  const auto open = [&] { h5_ = std::make_unique<Hdf5File>(file, Hdf5File::Mode::read); };
+  const auto end = what_ends([&] {
+    open();
+    read({});
+    states();
+  });
+  if (end)
+    throw UserError(fmt::format("{}: HDF5's library cannot read it (it ends with {}){}", name, *end, offer(file)));
+  read_or_refuse(open);
 }
 
 void CheckpointFile::refuse_other_versions(const std::map<std::string, std::string>& versions) const {

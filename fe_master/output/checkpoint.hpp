@@ -42,8 +42,8 @@ std::filesystem::path previous_checkpoint(const std::filesystem::path& file);
 /// A checkpoint that was found whole, open as long as the object lives. All throw UserError.
 class CheckpointFile {
  public:
-  /// Where there is none, or one that is damaged, of another format or of something else; the sentence names the one
-  /// before it, if that is whole.
+  /// Where there is none, or one that is damaged, of another format or of something else, by which HDF5's library ends
+  /// too (tried in a process of its own): a sentence, which names the one before it, if that is whole.
   explicit CheckpointFile(const std::filesystem::path& file);
 
   /// All but the states, bit-equal. Refuses a checkpoint of other versions than `versions` (of the names that both

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pthread.h>
 #include <unistd.h>
 
 #include <cstddef>
@@ -23,6 +24,12 @@ inline std::string file_of(const std::uint8_t* bytes, std::size_t size, const st
   std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(bytes), static_cast<std::streamsize>(size));
   return file;
 }
+
+/// What ends a process that a reader has made for a library is no crash of the reader: libFuzzer shall not keep it.
+extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
+inline const int deaths_of_children_are_not_told = pthread_atfork(nullptr, nullptr, [] {
+  if (__sanitizer_set_death_callback) __sanitizer_set_death_callback(nullptr);
+});
 
 /// Removes it at the end of the scope.
 struct Removed {
