@@ -136,7 +136,7 @@ void warn_of_rough_answers(const Case& c, std::vector<std::string>& out) {
   if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlow) return;
   out.push_back(fmt::format(
       "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: twice the "
-      "evaluations and more, and rejected steps; set ve.answer = \"mean\"",
+      "evaluations and more, and rejected steps; set ve.answer = \"mean\", and solver.last_correction = \"learned\"",
       c.ve.inertial_number));
 }
 
