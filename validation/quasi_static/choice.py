@@ -73,7 +73,7 @@ def draw(found, scatters, file):
             line = [(run.dem_steps, 100 * off["curve"], run.number) for run, off, _ in of_size if run.answer == answer]
             if not line:
                 continue
-            axis.loglog(*zip(*[p[:2] for p in line]), marker=marker, linestyle="", label=answer)
+            axis.loglog(*zip(*[p[:2] for p in line]), marker=marker, color=f"C{list(MARKERS).index(answer)}", linestyle="", label=answer)
             for x, y, number in line:
                 axis.annotate(f"{number:g}", (x, y), fontsize=6, xytext=(3, 3), textcoords="offset points")
         axis.loglog(*zip(*[(run.dem_steps, 100 * off["curve"]) for run, off, best in of_size if best]), "k-", linewidth=0.7)
