@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Whether two folders hold the same results, to the bit: history.csv and results.h5, what depends on the clock apart.
 
     same_results.py FOLDER FOLDER     exit status 1 and the differences where they differ

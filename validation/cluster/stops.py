@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Stops a run at random moments, by signals and by kill -9, and goes on with other numbers of ranks: the same bits?
 
     validation/cluster/stops.py [--stops 20] [--seed 1] [--ranks 1 2 4] [--record] [--runs FOLDER] [--femxdem PROGRAM]

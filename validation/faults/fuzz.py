@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The readers of files that others write, fuzzed: case file, .msh, checkpoint (libFuzzer, AddressSanitizer; clang).
 
     validation/faults/fuzz.py [READER ...] [--minutes 10] [--record]

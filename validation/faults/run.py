@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Faults injected into runs at instants drawn by seed: what goes on, what ends with which status, and what is lost.
 
     validation/faults/run.py [KIND ...] [--times X] [--record]

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Runs under a fault every few seconds: memory, processes, shared memory and temporary files that they leave behind.
 
     validation/faults/soak.py [--minutes 30] [--femxdem PROGRAM] [--runs FOLDER]
