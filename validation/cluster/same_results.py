@@ -52,6 +52,9 @@ def differences(one, other):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3 or not all((Path(f) / "history.csv").exists() for f in sys.argv[1:]):
+        print("give two folders with a history.csv each: same_results.py A B", file=sys.stderr)
+        sys.exit(2)
     said = differences(*sys.argv[1:3])
     print("\n".join(said) or "equal to the bit")
     sys.exit(bool(said))
