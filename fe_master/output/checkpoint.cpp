@@ -136,9 +136,14 @@ CheckpointFile::CheckpointFile(const fs::path& file) : file_(file) {
   if (const auto fault = broken_seal(file)) throw UserError(fmt::format("{}: {}{}", name, *fault, offer(file)));
   const auto open = [&] { h5_ = std::make_unique<Hdf5File>(file, Hdf5File::Mode::read); };
   const auto end = what_ends([&] {
+    Hdf5File::forget_memory();
     open();
-    read({});
-    states();
+    try {
+      read({});
+      states();
+    } catch (const UserError&) {  // it is said by the process that reads the file for good
+    }
+    h5_.reset();  // closing ends it too
   });
   if (end)
     throw UserError(fmt::format("{}: HDF5's library cannot read it (it ends with {}){}", name, *end, offer(file)));

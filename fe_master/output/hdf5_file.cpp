@@ -57,6 +57,8 @@ bool is_single(hid_t attribute) {
 
 }  // namespace
 
+void Hdf5File::forget_memory() { H5garbage_collect(); }
+
 Hdf5File::Hdf5File(const std::filesystem::path& file, Mode mode) : file_(file), mode_(mode) {
   H5dont_atexit();  // at the end of the program it would write again what could not be written
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are exceptions, not text on stderr

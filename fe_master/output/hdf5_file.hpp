@@ -23,6 +23,8 @@ struct Hdf5Error : std::runtime_error {
 /// undone: at the end of the object or, where the process was killed, by the next update (undo_driver.hpp).
 class Hdf5File {
  public:
+  /// Gives back the memory that the library keeps for later use, with what it held.
+  static void forget_memory();
   /// create truncates; read and update want an existing file
   enum class Mode { create, read, update };
 
