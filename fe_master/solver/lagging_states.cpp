@@ -1,7 +1,5 @@
 #include "lagging_states.hpp"
 
-#include <algorithm>
-
 namespace femxdem {
 
 std::vector<Tensor2> LaggingStates::begin_step(std::vector<Tensor2> start, const PointOperators& operators) {
@@ -44,16 +42,11 @@ std::vector<Tensor2> LaggingStates::end_stresses(std::span<const Tensor2> F, std
 }
 
 void LaggingStates::save(NamedArrays& arrays) const {
-  if (!active_) return;
-  std::vector<double> values;
-  for (const Tensor2& F : state_) values.insert(values.end(), F.data(), F.data() + 9);
-  arrays.emplace_back("solver.lagging_states", std::move(values));
+  if (active_) add_tensors(arrays, "solver.lagging_states", state_);
 }
 
 void LaggingStates::load(const NamedArrays& arrays) {
-  if (!active_) return;
-  const auto& values = find_array(arrays, "solver.lagging_states");
-  for (std::size_t p = 0; p < state_.size(); ++p) std::copy_n(&values.at(9 * p), 9, state_[p].data());
+  if (active_) find_tensors(arrays, "solver.lagging_states", state_);
 }
 
 }  // namespace femxdem

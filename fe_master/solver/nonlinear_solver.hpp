@@ -74,10 +74,9 @@ struct Equilibrium {
 struct StepStart {
   double time = 0;              ///< [s]
   Eigen::VectorXd x;            ///< unknowns (Formulation)
-  Eigen::VectorXd multipliers;  ///< of the constraints (Formulation) [Pa]; not used for theta = 1, nor the next two
+  Eigen::VectorXd multipliers;  ///< of the constraints (Formulation) [Pa]; for theta < 1 alone, as the next two
   double load_factor = 0;       ///< of the released loads [-]
-  Eigen::VectorXd
-      lacking;  ///< internal less external forces of the stresses there, 0 where prescribed; 0 for theta = 1
+  Eigen::VectorXd lacking;      ///< internal less external forces of the stresses there; 0 where prescribed
 };
 
 /// Equilibrium of the finite elements with their material points, step by step.

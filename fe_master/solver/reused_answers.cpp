@@ -1,7 +1,5 @@
 #include "reused_answers.hpp"
 
-#include <algorithm>
-
 namespace femxdem {
 
 void ReusedAnswers::begin_step() {
@@ -46,16 +44,11 @@ void ReusedAnswers::judge(const Misfit& misfit) {
 }
 
 void ReusedAnswers::save(NamedArrays& arrays) const {
-  if (below_ == 0) return;
-  std::vector<double> values;
-  for (const Tensor2& F : state_) values.insert(values.end(), F.data(), F.data() + 9);
-  arrays.emplace_back("reuse.F", std::move(values));
+  if (below_ > 0) add_tensors(arrays, "reuse.F", state_);
 }
 
 void ReusedAnswers::load(const NamedArrays& arrays) {
-  if (below_ == 0) return;
-  const auto& values = find_array(arrays, "reuse.F");
-  for (std::size_t p = 0; p < state_.size(); ++p) std::copy_n(&values.at(9 * p), 9, state_[p].data());
+  if (below_ > 0) find_tensors(arrays, "reuse.F", state_);
 }
 
 }  // namespace femxdem

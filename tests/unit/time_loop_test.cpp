@@ -35,6 +35,19 @@ Case block(double end_time = 1) {
   return c;
 }
 
+const VonMisesLaw kHardening{1000, 0.25, 2, 50, 0, 0};
+
+/// The same sheared by 2 %, for kHardening and learned tangents, with a checkpoint every four steps.
+Case sheared_block(double displacement_tolerance) {
+  Case c = block();
+  c.solver.tolerance = 1e-3;
+  c.solver.displacement_tolerance = displacement_tolerance;
+  c.output.checkpoint_every = 4;
+  c.loads.back().component = Component::x;
+  c.loads.back().value = 0.02;
+  return c;
+}
+
 std::string text_of(const std::filesystem::path& file) { return read_file(file); }
 
 /// Rows of history.csv without the columns of the clock.
@@ -88,41 +101,29 @@ TEST_F(TimeLoopTest, ARestartEqualsTheUninterruptedRun) {
 }
 
 TEST_F(TimeLoopTest, ReusedAnswersAreCountedAndARestartGoesOnWithThem) {
-  Case c = block();
-  c.solver.tolerance = 1e-3;
-  c.solver.displacement_tolerance = 0.1;
+  Case c = sheared_block(0.1);
   c.solver.reuse_below = 0.5;
-  c.output.checkpoint_every = 4;
-  c.loads.back().component = Component::x;  // sheared
-  c.loads.back().value = 0.02;
-  const VonMisesLaw law{1000, 0.25, 2, 50, 0, 0};
-  ASSERT_EQ(run(c, law), kDone);
+  ASSERT_EQ(run(c, kHardening), kDone);
   const auto whole = rows(folder_);
   EXPECT_TRUE(whole.front().ends_with(",reused,reuse_error")) << whole.front();
   const std::string log = text_of(folder_ / "log.txt");
   EXPECT_NE(log.find(" % of the answers from learned tangents, their error at most "), std::string::npos);
   EXPECT_EQ(log.find("; 0.0 % of the answers"), std::string::npos) << "some were reused";
-  EXPECT_EQ(run(c, law, Existing::resume), kDone);
+  EXPECT_EQ(run(c, kHardening, Existing::resume), kDone);
   EXPECT_EQ(rows(folder_), whole);
 }
 
 TEST_F(TimeLoopTest, LearnedEndsAreCountedAndARestartGoesOnWithThem) {
-  Case c = block();
-  c.solver.tolerance = 1e-3;
-  c.solver.displacement_tolerance = 0.3;
+  Case c = sheared_block(0.3);
   c.solver.last_correction = LastCorrection::learned;
-  c.output.checkpoint_every = 4;
-  c.loads.back().component = Component::x;  // sheared
-  c.loads.back().value = 0.02;
-  const VonMisesLaw law{1000, 0.25, 2, 50, 0, 0};
-  ASSERT_EQ(run(c, law), kDone);
+  ASSERT_EQ(run(c, kHardening), kDone);
   const auto whole = rows(folder_);
   EXPECT_TRUE(whole.front().ends_with(",learned_end")) << whole.front();
   const long learned = std::count_if(whole.begin(), whole.end(), [](const auto& row) { return row.ends_with(",1"); });
   EXPECT_GT(learned, 0);
   EXPECT_NE(text_of(folder_ / "log.txt").find(fmt::format("; the last correction of {} of them by", learned)),
             std::string::npos);
-  EXPECT_EQ(run(c, law, Existing::resume), kDone);
+  EXPECT_EQ(run(c, kHardening, Existing::resume), kDone);
   EXPECT_EQ(rows(folder_), whole);
 }
 
