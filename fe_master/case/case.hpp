@@ -61,8 +61,9 @@ struct Case {
 
 /// What a case file must be complete for.
 enum class Purpose {
-  run,     ///< a boundary value problem: mesh, control, ...
-  ve_path  ///< a single material point: [material] or [ve], and [[path]]
+  run,       ///< a boundary value problem: mesh, control, ...
+  ve_path,   ///< a single material point: [material] or [ve], and [[path]]
+  ve_of_run  ///< the single volume element of a boundary value problem
 };
 
 /// Reads a case file; overrides are "key=value" texts, the value in TOML ("control.step=1e-3", "load.0.value=2").

@@ -288,6 +288,11 @@ void check_control_measure(const Case& c, const std::optional<std::set<std::stri
   }
 }
 
+bool learns_whole_corrections(const SolverParameters& solver) {
+  return solver.global_operator == GlobalOperator::quasi_newton && !solver.line_search &&
+         solver.acceleration == Acceleration::none;
+}
+
 void check_solver(const Case& c, Mistakes& m) {
   if (volume_elements(c) && c.solver.global_operator == GlobalOperator::tangent)
     m.add("solver.operator",
@@ -305,12 +310,14 @@ void check_solver(const Case& c, Mistakes& m) {
   if (c.solver.reuse_below > 0 && volume_elements(c) && c.ve.answer == VeAnswer::mean)
     m.add("solver.reuse_below",
           "solver.reuse_below is for answers of a trial's end; set ve.answer = \"end\", or reuse_below = 0");
-  if (c.solver.last_correction == LastCorrection::learned &&
-      (c.solver.global_operator != GlobalOperator::quasi_newton || c.solver.line_search ||
-       c.solver.acceleration != Acceleration::none))
+  if (c.solver.last_correction == LastCorrection::learned && !learns_whole_corrections(c.solver))
     m.add("solver.last_correction",
           "solver.last_correction = \"learned\" needs learned tangents and whole corrections; set solver.operator = "
           "\"quasi_newton\", line_search = false and acceleration = \"none\", or last_correction = \"evaluated\"");
+  if (c.solver.last_correction == LastCorrection::evaluated &&
+      c.solver.tolerance_over_noise != SolverParameters{}.tolerance_over_noise)
+    m.add("solver.tolerance_over_noise",
+          "solver.tolerance_over_noise is of no use with last_correction = \"evaluated\"; remove it");
   if (c.solver.qn_min >= c.solver.qn_max) m.add("solver.qn_min", "solver.qn_min is not below qn_max; lower it");
 }
 
@@ -330,7 +337,7 @@ void check_monitors(const Case& c, const std::optional<std::set<std::string>>& e
                     const std::set<std::string>& regions, Mistakes& m) {
   std::set<std::string> names = {"step", "time", "load_factor", "iterations", "evaluations", "dem_steps", "residual"};
   if (c.solver.reuse_below > 0) names.insert({"reused", "reuse_error"});
-  if (c.solver.last_correction == LastCorrection::learned) names.insert("learned_end");
+  if (c.solver.last_correction == LastCorrection::learned) names.insert({"tolerance", "learned_end"});
   for (std::size_t i = 0; i < c.monitors.size(); ++i) {
     const std::string key = fmt::format("monitor.{}", i);
     const std::string& name = c.monitors[i].name;
@@ -396,7 +403,17 @@ void require_known(const std::string& name, const std::set<std::string>& known, 
                                         : fmt::format("the {}s are {}", noun, list)));
 }
 
-void complete_case(Case& c, const Mistakes& m) {
+/// Slow trials of a boundary value problem answer with their mean, and where points do, a step's last correction is
+/// learned: the choice of validation/quasi_static. A single element is drawn beside YADE's own tests: its ends.
+void complete_answers(Case& c, Purpose purpose, const Mistakes& m) {
+  const bool has_mean = c.ve.hold_steps == 0 && c.solver.reuse_below == 0;
+  if (!m.has("ve.answer") && purpose == Purpose::run && has_mean && c.ve.inertial_number <= kSlowTrial)
+    c.ve.answer = VeAnswer::mean;
+  if (!m.has("solver.last_correction") && c.ve.answer == VeAnswer::mean && learns_whole_corrections(c.solver))
+    c.solver.last_correction = LastCorrection::learned;
+}
+
+void complete_case(Case& c, Purpose purpose, const Mistakes& m) {
   const bool ve = volume_elements(c);
   if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
   complete_by_preset(c, m);
@@ -413,6 +430,7 @@ void complete_case(Case& c, const Mistakes& m) {
   for (std::size_t i = 0; i < c.ve_regions.size(); ++i)
     complete_ve(c.ve_regions[i].ve,
                 [&](const std::string& key) { return given(key) || m.has(fmt::format("ve.region.{}.{}", i, key)); });
+  if (ve) complete_answers(c, purpose, m);
 }
 
 void check_case(const Case& c, Purpose purpose, Mistakes& m) {

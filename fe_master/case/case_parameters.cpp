@@ -184,7 +184,8 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
   return {
       parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
       word("answer", &V::answer, {"end", "mean"},
-           "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do"),
+           "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do; "
+           "default mean where a boundary value problem has inertial_number <= 5e-3, else end"),
       parameter("mean_at", &V::mean_at, "", {0.5, 2.0 / 3},
                 "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
       parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),
@@ -288,8 +289,13 @@ Section<SolverParameters> solver_section() {
        parameter("displacement_tolerance", &S::displacement_tolerance, "", kPositive,
                  "correction / displacement of the step; default 0.1 for volume elements, 1e-6 for closed forms"),
        word("last_correction", &S::last_correction, {"evaluated", "learned"},
-            "learned: where what a correction leaves is known from the steps before to be within the tolerance, points "
+            "default learned where ve.answer is mean, else evaluated; learned: where what a correction leaves is known "
+            "from the steps before to be within the tolerance, points "
             "answer to the last one from their learned tangents, unevaluated"),
+       parameter(
+           "tolerance_over_noise", &S::tolerance_over_noise, "", kNotNegative,
+           "with learned last corrections: the residual that is to be expected may be so many times its noise, as "
+           "the last steps show it, at most twice the tolerance; 0: the tolerance"),
        parameter("max_iterations", &S::max_iterations, "", kAtLeastOne, "then the step is cut"),
        parameter("accept_best_factor", &S::accept_best_factor, "", kAtLeastOne,
                  "the best iterate is accepted, and flagged, below this times the tolerance"),

@@ -1,5 +1,6 @@
 #define TOML_HEADER_ONLY 1
-#define TOML_ASSERT(expr) static_assert(true)  // toml++ 3.3 asserts that a key begins as one, and refuses it right after
+#define TOML_ASSERT(expr) \
+  static_assert(true)  // toml++ 3.3 asserts that a key begins as one, and refuses it right after
 #include <fmt/core.h>
 #include <toml++/toml.h>
 
@@ -338,7 +339,7 @@ Case read_case(const std::string& path, const std::vector<std::string>& override
       reader.read(root, section, values, c);
   });
   reader.unknown_tables(root);
-  complete_case(c, mistakes);
+  complete_case(c, purpose, mistakes);
   check_case(c, purpose, mistakes);
   if (!mistakes.empty()) throw UserError(mistakes.text());
   return c;

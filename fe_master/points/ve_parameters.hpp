@@ -70,6 +70,9 @@ struct VeParameters {
   std::string cache;  ///< folder of prepared packings, absolute path; empty: the caller chooses
 };
 
+/// Inertial numbers up to this are slow: a trial's end is a rough function of its strain (validation/quasi_static) [-].
+constexpr double kSlowTrial = 5e-3;
+
 /// Where in a trial the stress that answers it belongs [-].
 inline double answer_at(const VeParameters& ve) { return ve.answer == VeAnswer::mean ? ve.mean_at : 1; }
 

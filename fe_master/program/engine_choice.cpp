@@ -99,6 +99,8 @@ PreparedRun prepare_run(WorkerProcess& worker, const VeParameters& ve, std::vect
   options.versions.merge(engine_versions(maker));
   const EngineVerdict verdict = choose_engine(ve.engine, worker, prepared.states);
   options.remarks.push_back(verdict.sentence);
+  if (ve.answer == VeAnswer::mean)
+    options.remarks.emplace_back("stresses are means over trials: curves and fields are of mid-step (ve.answer)");
   prepared.engine = verdict.engine;
   return prepared;
 }

@@ -259,7 +259,7 @@ Case read_path_case(const std::string& file, const std::vector<std::string>& ove
     // Perhaps nothing is wrong but that a boundary value problem has no path.
     Case c;
     try {
-      c = read_case(file, overrides, Purpose::run);
+      c = read_case(file, overrides, Purpose::ve_of_run);
     } catch (const UserError&) {
     }
     if (c.file.empty() || !c.path.empty()) throw;

@@ -61,7 +61,10 @@ class TimeLoop {
     long answers = 0;
     double error = 0;  // largest that was accepted
   } reuse_, reuse_of_step_;
-  int learned_ends_ = 0;  // steps whose last correction was answered by learned tangents
+  struct LearnedEnds {  // steps whose last correction was answered by learned tangents
+    int steps = 0, raised = 0;
+    double tolerance = 0;  // largest that noise has raised it to
+  } learned_ends_;
   EndRequest end_request_;
   std::string end_reason_;  // why it is to end now
   Checkpoint state_;        // of the last converged step, without that of the points
@@ -202,8 +205,13 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
     record_.monitors.push_back(static_cast<double>(reuse_of_step_.answers));
     record_.monitors.push_back(reuse_of_step_.error);
   }
-  learned_ends_ += last_.learned_at_end;
-  if (learns_ends()) record_.monitors.push_back(last_.learned_at_end);
+  if (learns_ends()) {
+    record_.monitors.push_back(last_.tolerance);
+    record_.monitors.push_back(last_.learned_at_end);
+    learned_ends_.steps += last_.learned_at_end;
+    learned_ends_.raised += last_.tolerance > case_.solver.tolerance;
+    learned_ends_.tolerance = std::max(learned_ends_.tolerance, last_.tolerance);
+  }
   reuse_ = {reuse_.answers + reuse_of_step_.answers, std::max(reuse_.error, reuse_of_step_.error)};
   files_.add(record_);
   files_.log.step(record_, table, done);
@@ -226,7 +234,7 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
 std::vector<std::string> TimeLoop::columns() const {
   std::vector<std::string> names = monitor_names(case_);
   if (reuses()) names.insert(names.end(), {"reused", "reuse_error"});
-  if (learns_ends()) names.push_back("learned_end");
+  if (learns_ends()) names.insert(names.end(), {"tolerance", "learned_end"});
   return names;
 }
 
@@ -238,9 +246,13 @@ std::string TimeLoop::reuse_account() const {
                      100 * static_cast<double>(reuse_.answers) / answers, reuse_.error);
 }
 
-/// How many steps have ended without an evaluation of the last correction.
+/// How many steps have ended without an evaluation of the last correction, and what they were held against.
 std::string TimeLoop::learned_ends_account() const {
-  return learns_ends() ? fmt::format("; the last correction of {} of them by learned tangents", learned_ends_) : "";
+  if (!learns_ends()) return "";
+  const std::string ends = fmt::format("; the last correction of {} of them by learned tangents", learned_ends_.steps);
+  if (learned_ends_.raised == 0) return ends;
+  return ends + fmt::format(", in {} with the tolerance raised by the residual's noise, at most to {:.1e}",
+                            learned_ends_.raised, learned_ends_.tolerance);
 }
 
 std::string TimeLoop::place(std::size_t point) const {
@@ -266,7 +278,9 @@ void TimeLoop::keep_state() {
   if (reuses())
     state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
   if (learns_ends())
-    state_.arrays.emplace_back("run.learned_ends", std::vector<double>{static_cast<double>(learned_ends_)});
+    state_.arrays.emplace_back("run.learned_ends",
+                               std::vector<double>{static_cast<double>(learned_ends_.steps),
+                                                   static_cast<double>(learned_ends_.raised), learned_ends_.tolerance});
 }
 
 void TimeLoop::write_state() {
@@ -325,7 +339,10 @@ void TimeLoop::restart() {
     const auto& reuse = find_array(then.arrays, "run.reuse");
     reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
   }
-  if (learns_ends()) learned_ends_ = static_cast<int>(find_array(then.arrays, "run.learned_ends").at(0));
+  if (learns_ends()) {
+    const auto& ends = find_array(then.arrays, "run.learned_ends");
+    learned_ends_ = {static_cast<int>(ends.at(0)), static_cast<int>(ends.at(1)), ends.at(2)};
+  }
   files_.log.start_from(then.time / case_.control.end_time);
   files_.log.say(fmt::format("restart after step {} (time {:g})", then.step, then.time));
   resumed_ = {};

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kElementsForForce = 4, kElementsForWidth = 14;  // across the band, on the bilinear bar
 constexpr double kVeSoftening = 1.4;                             // |a| / sigma_0
-constexpr double kSlow = 3e-3;                                   // inertial number (validation/quasi_static)
 
 /// The most negative eigenvalue over the directions, and the elastic modulus along its eigenvector.
 BandModuli least_moduli(const Tensor4& tangent, const Tensor4& elastic) {
@@ -133,10 +132,11 @@ void warn_of_identical_points(const Case& c, const BandModuli& moduli, std::vect
 }
 
 void warn_of_rough_answers(const Case& c, std::vector<std::string>& out) {
-  if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlow) return;
+  if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlowTrial) return;
   out.push_back(fmt::format(
-      "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: twice the "
-      "evaluations and more, and rejected steps; set ve.answer = \"mean\", and solver.last_correction = \"learned\"",
+      "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: up to "
+      "three times the "
+      "evaluations, and rejected steps; leave ve.answer, solver.reuse_below and ve.hold_steps at their defaults",
       c.ve.inertial_number));
 }
 

@@ -13,8 +13,9 @@ constexpr double kDivergence = 1e3;  // growth over the first residual and over 
 constexpr double kSame = 1e-9;       // relative difference of residuals that repeat themselves
 constexpr std::size_t kLongestCycle = 4;
 constexpr std::size_t kWindow = 6;         // last residuals that are looked at for a verdict
-constexpr double kForgottenInAStep = 0.2;  // of what is known about contraction
+constexpr double kForgottenInAStep = 0.2;  // of what is known about contraction and noise
 constexpr double kNear = 4;                // times the tolerance: residuals from which contraction is learned
+constexpr double kGrowth = 1.5;            // a residual above this times the one before is no correction's
 constexpr double kProgress = 0.7;          // a least residual above this times the earlier one is no progress
 
 bool same(double a, double b) { return std::abs(a - b) <= kSame * std::max(a, b); }
@@ -72,30 +73,52 @@ bool Contraction::near(double residual) const { return residual > 0 && residual 
 void Contraction::begin_step() {
   last_ = 0;
   seen_ *= 1 - kForgottenInAStep;
-  ratio2_ *= 1 - kForgottenInAStep;
+  for (double& sum : sums_) sum *= 1 - kForgottenInAStep;
 }
 
 void Contraction::add(double residual) {
-  if (near(last_)) {
+  if (residual > kGrowth * last_) {
+    if (last_ > 0) seen_ = 0, sums_ = {};
+  } else if (near(last_)) {
+    const double x = std::pow(last_ / tolerance_, 2), y = std::pow(residual / tolerance_, 2), w = std::pow(1 + x, -2);
+    const std::array<double, 5> terms = {1, x, y, x * x, x * y};
+    for (std::size_t i = 0; i < terms.size(); ++i) sums_[i] += w * terms[i];
     seen_ += 1;
-    ratio2_ += std::pow(residual / last_, 2);
   }
   last_ = residual;
 }
 
+Contraction::Squares Contraction::fitted() const {
+  if (seen_ < 1) return {};
+  const auto [w, x, y, xx, xy] = sums_;
+  const double spread = w * xx - x * x;
+  const double slope = w * xy - x * y, offset = xx * y - x * xy;  // times spread
+  if (spread <= 1e-9 * w * xx || offset <= 0) return {xy / xx, 0};
+  return slope <= 0 ? Squares{0, y / w} : Squares{slope / spread, offset / spread};
+}
+
 std::optional<double> Contraction::after(double residual) const {
   if (seen_ < 1 || !near(residual)) return std::nullopt;
-  return std::sqrt(ratio2_ / seen_) * residual;
+  const Squares squares = fitted();
+  return std::hypot(std::sqrt(squares.contraction) * residual, std::sqrt(squares.noise) * tolerance_);
+}
+
+double Contraction::noise() const { return std::sqrt(fitted().noise) * tolerance_; }
+
+double Contraction::tolerance() const {
+  return over_noise_ > 0 ? std::clamp(over_noise_ * noise(), tolerance_, kMostRaised * tolerance_) : tolerance_;
 }
 
 void Contraction::save(NamedArrays& arrays) const {
-  arrays.emplace_back("solver.contraction", std::vector<double>{seen_, ratio2_});
+  std::vector<double> values(sums_.begin(), sums_.end());
+  values.push_back(seen_);
+  arrays.emplace_back("solver.contraction", std::move(values));
 }
 
 void Contraction::load(const NamedArrays& arrays) {
   const auto& values = find_array(arrays, "solver.contraction");
-  seen_ = values.at(0);
-  ratio2_ = values.at(1);
+  std::copy_n(values.begin(), sums_.size(), sums_.begin());
+  seen_ = values.at(sums_.size());
 }
 
 }  // namespace femxdem

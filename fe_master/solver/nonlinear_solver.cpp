@@ -77,7 +77,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       last_{0, start_.lacking, committed_.multipliers, start_.lacking, 0},
       operators_(parameters, committed_.responses, formulation.strain_components()),
       reuse_(parameters.reuse_below, points.size()),
-      contraction_(parameters.tolerance),
+      contraction_(parameters.tolerance, parameters.tolerance_over_noise),
       lagging_(parameters.last_correction == LastCorrection::learned, points_),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
   assert(parameters.reuse_below == 0 || parameters.answer_at == 1);
@@ -89,6 +89,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
 
 StepResult NonlinearSolver::solve_step(double dt, const std::optional<MeasureTarget>& target) {
   StepResult result;
+  result.tolerance = parameters_.tolerance;
   target_ = target;
   Equilibrium trial = committed_, best;
   begin_step(trial, dt);
@@ -349,14 +350,15 @@ bool NonlinearSolver::converged(const Iteration& iteration) const {
 }
 
 /// Ends the step with a correction, to z, to which the points answer from their learned tangents, unevaluated, where
-/// the residual that is to be expected so (Contraction) is within the tolerance. Their states stay where they were
-/// evaluated; the next step takes them from there to where the mesh is then. False: nothing has happened.
+/// the residual that is to be expected so (Contraction) is within the tolerance, as its noise may have raised it. Their
+/// states stay where they were evaluated; the next step takes them from there to where the mesh is then. False: nothing
+/// has happened.
 bool NonlinearSolver::correct_unevaluated(Equilibrium& trial, const Eigen::VectorXd& z, StepResult& result) {
   Iteration& now = result.table.back();
   if (parameters_.last_correction == LastCorrection::evaluated) return false;
   const std::optional<double> expected = contraction_.after(now.residual);
-  if (!expected || *expected > parameters_.tolerance || now.correction > parameters_.displacement_tolerance)
-    return false;
+  const double tolerance = contraction_.tolerance();
+  if (!expected || *expected > tolerance || now.correction > parameters_.displacement_tolerance) return false;
   Equilibrium moved = trial;
   move(moved, z);
   moved.F = formulation_.deformation(moved.x);
@@ -367,11 +369,13 @@ bool NonlinearSolver::correct_unevaluated(Equilibrium& trial, const Eigen::Vecto
   moved.internal = assembler_.force(moved.configuration(), stresses(moved.responses));
   moved.external = loads_.external_force(moved.x, moved.time, moved.load_factor);
   const double residual = *expected + relative_residual(moved), constraints = gap(moved);
-  if (residual > parameters_.tolerance || constraints > kGapTolerance) return false;
+  if (residual > tolerance || constraints > kGapTolerance) return false;
   now.note = fmt::format("residual {:.1e}, its correction by learned tangents", now.residual);
+  if (tolerance > parameters_.tolerance) now.note += fmt::format(", tolerance {:.1e}", tolerance);
   now.residual = residual;
   now.gap = constraints;
   result.learned_at_end = true;
+  result.tolerance = tolerance;
   trial = std::move(moved);
   return true;
 }

@@ -41,6 +41,7 @@ struct StepResult {
   bool stopped = false;         ///< dropped, because the run is to end
   bool learned_at_end = false;  ///< its last correction was answered by learned tangents
   bool best_accepted = false;   ///< accepted above the tolerance, below accept_best_factor times it
+  double tolerance = 0;         ///< that its residual was held against (Contraction) [-]
   int evaluations = 0;          ///< VE evaluations: every point strained once
   double dem_steps = 0;         ///< DEM steps of all points
   long reused = 0;              ///< answers of points from their learned tangents (ReusedAnswers)

@@ -18,6 +18,7 @@ struct SolverParameters {
   double tolerance = kNotGiven;               ///< force residual / reaction and external scale [-]
   double displacement_tolerance = kNotGiven;  ///< correction / displacement of the step [-]
   LastCorrection last_correction = LastCorrection::evaluated;
+  double tolerance_over_noise = 1.5;  ///< of learned ends (Contraction) [-]
   int max_iterations = 15;
   double accept_best_factor = 1.0;  ///< best iterate accepted below this times the tolerance, and flagged [-]
   Acceleration acceleration = Acceleration::none;

@@ -280,6 +280,35 @@ TEST_F(CaseWithPreset, IsThatOfItsPage) {
   }
 }
 
+/// The choice of validation/quasi_static, where nothing that is given is against it.
+TEST_F(CaseWithPreset, SlowTrialsAnswerWithTheirMeanUnlessGiven) {
+  struct Row {
+    std::vector<std::string> words;
+    VeAnswer answer;
+    LastCorrection last;
+  };
+  for (const Row& row :
+       {Row{{}, VeAnswer::mean, LastCorrection::learned},
+        Row{{"ve.inertial_number=2e-3"}, VeAnswer::mean, LastCorrection::learned},
+        Row{{"ve.inertial_number=6e-3"}, VeAnswer::end, LastCorrection::evaluated},
+        Row{{"ve.inertial_number=6e-3", "ve.answer=mean"}, VeAnswer::mean, LastCorrection::learned},
+        Row{{"ve.answer=end"}, VeAnswer::end, LastCorrection::evaluated},
+        Row{{"solver.last_correction=evaluated"}, VeAnswer::mean, LastCorrection::evaluated},
+        Row{{"solver.acceleration=anderson"}, VeAnswer::mean, LastCorrection::evaluated},
+        Row{{"solver.operator=elastic"}, VeAnswer::mean, LastCorrection::evaluated},
+        Row{{"solver.reuse_below=0.1"}, VeAnswer::end, LastCorrection::evaluated},
+        Row{{"ve.contact_law=paper", "ve.hold_steps=20"}, VeAnswer::end, LastCorrection::evaluated},
+        Row{{"material.young=1e7", "material.type=elastic"}, VeAnswer::end, LastCorrection::evaluated}}) {
+    std::vector<std::string> words = {"control.step=0.02"};
+    words.insert(words.end(), row.words.begin(), row.words.end());
+    SCOPED_TRACE(row.words.empty() ? "as it is" : row.words.back());
+    const Case c = read_case(file(), words);
+    EXPECT_EQ(c.ve.answer, row.answer);
+    EXPECT_EQ(c.solver.last_correction, row.last);
+  }
+  EXPECT_EQ(read_case(file(), {"control.step=0.02"}, Purpose::ve_of_run).ve.answer, VeAnswer::end);
+}
+
 TEST_F(CaseWithPreset, KeepsWhatItGives) {
   const Case c = read_case(file(), {"ve.preset=fast", "ve.spheres=321", "ve.inertial_number=3e-3", "ve.min_steps=7",
                                     "solver.tolerance=2e-3", "control.step=0.01"});

@@ -19,11 +19,13 @@ constexpr double kThetas[] = {1, 0.5};
 /// The softening biaxial test, second gradient, on points that answer with the mean over their trials (theta < 1) or
 /// with the end.
 struct Ending {
-  Ending(LastCorrection last, double theta, double tolerance = kTolerance, double noise = 0) {
+  Ending(LastCorrection last, double theta, double tolerance = kTolerance, double noise = 0,
+         double over_noise = SolverParameters{}.tolerance_over_noise) {
     SolverParameters parameters = solver_parameters(GlobalOperator::quasi_newton, tolerance, 30);
     problem = softening_biaxial(4, 2e3, parameters);
     parameters.last_correction = last;
     parameters.answer_at = theta;
+    parameters.tolerance_over_noise = over_noise;
     if (noise > 0) parameters.qn_first = 0.5, parameters.qn_scatter = 0.1;  // as of volume elements
     points.emplace(softening_laws(*problem.element, kHardening), theta, noise);
     problem.solver = std::make_unique<NonlinearSolver>(*problem.element, *points, *problem.loads, parameters);
@@ -106,6 +108,24 @@ TEST(LastCorrection, NoisyAnswersNeedNoMoreEvaluationsThanWithoutIt) {
   }
 }
 
+/// Noise that keeps the residual above the tolerance: no number of iterations is enough otherwise.
+TEST(LastCorrection, TheToleranceFollowsNoiseThatReachesIt) {
+  constexpr double kFine = 2e-3, kNoise = 4e-4;
+  constexpr int kBeforePeak = 8;
+  for (const double theta : kThetas) {
+    Ending following(LastCorrection::learned, theta, kFine, kNoise),
+        waiting(LastCorrection::learned, theta, kFine, kNoise, 0);
+    EXPECT_FALSE(waiting.solver().solve_step(1).converged) << theta;
+    for (int i = 0; i < kBeforePeak; ++i) {
+      const StepResult result = following.step();
+      EXPECT_LE(result.table.back().residual, result.tolerance);
+      EXPECT_LE(result.tolerance, Contraction::kMostRaised * kFine);
+      EXPECT_NEAR(following.problem.reaction("top", 1) / exact_force(theta).at(static_cast<std::size_t>(i)), 1, kFine);
+    }
+    EXPECT_LE(following.evaluations, 3 * kBeforePeak) << theta;
+  }
+}
+
 /// Where the mesh is at the end, points that have gone there from their own states balance as well as was expected.
 TEST(LastCorrection, ForcesBalanceWhereTheMeshIs) {
   Ending on(LastCorrection::learned, 1);
@@ -165,23 +185,62 @@ TEST(LastCorrection, ARestartHasTheSameBits) {
   }
 }
 
-TEST(Contraction, IsTheRootMeanSquareOfWhatCorrectionsNearTheToleranceHaveLeft) {
-  Contraction contraction(1e-3);
-  EXPECT_FALSE(contraction.after(2e-3)) << "nothing seen";
-  for (const double residual : {1e-1, 4e-3, 2e-3, 4e-4}) contraction.add(residual);  // 0.5 and 0.2; 0.04 from too far
-  const double ratio = std::sqrt((0.5 * 0.5 + 0.2 * 0.2) / 2);
-  ASSERT_TRUE(contraction.after(2e-3));
-  EXPECT_NEAR(*contraction.after(2e-3), ratio * 2e-3, 1e-12);
-  EXPECT_FALSE(contraction.after(4.1e-3)) << "larger than any it was learned from";
-  for (int step = 0; step < 3; ++step) contraction.begin_step();
-  ASSERT_TRUE(contraction.after(2e-3)) << "1.02 residuals are left";
+/// Residuals of steps that start from each of `first`, three of them, r_{k+1}^2 = a^2 r_k^2 + noise^2.
+void add_steps(Contraction& contraction, std::initializer_list<double> first, double a, double noise) {
+  for (double residual : first) {
+    contraction.begin_step();
+    for (int i = 0; i < 3; ++i) {
+      contraction.add(residual);
+      residual = std::hypot(a * residual, noise);
+    }
+  }
+}
+
+TEST(Contraction, TellsWhatCorrectionsLeaveFromNoise) {
+  constexpr double kGiven = 5e-3, kLeft = 0.3, kNoise = 6e-3;
+  Contraction contraction(kGiven, 1.5), most(kGiven, 5), never(kGiven, 0);
+  EXPECT_FALSE(contraction.after(7e-3)) << "nothing seen";
+  EXPECT_EQ(contraction.noise(), 0);
+  EXPECT_EQ(contraction.tolerance(), kGiven);
+  for (Contraction* each : {&contraction, &most, &never}) {
+    add_steps(*each, {1.9e-2, 1.5e-2, 8e-3}, kLeft, kNoise);
+    EXPECT_NEAR(each->noise(), kNoise, 1e-9);
+    ASSERT_TRUE(each->after(1e-2));
+    EXPECT_NEAR(*each->after(1e-2), std::hypot(kLeft * 1e-2, kNoise), 1e-9);
+  }
+  EXPECT_FALSE(contraction.after(2.1e-2)) << "larger than any it was learned from";
+  EXPECT_NEAR(contraction.tolerance(), 1.5 * kNoise, 1e-9);
+  EXPECT_EQ(most.tolerance(), 2 * kGiven);
+  EXPECT_EQ(never.tolerance(), kGiven);
   NamedArrays arrays;
   contraction.save(arrays);
-  Contraction same(1e-3);
+  Contraction same(kGiven, 1.5);
   same.load(arrays);
-  EXPECT_EQ(*same.after(2e-3), *contraction.after(2e-3));
+  EXPECT_EQ(same.tolerance(), contraction.tolerance());
+  EXPECT_EQ(*same.after(1e-2), *contraction.after(1e-2));
+}
+
+TEST(Contraction, HasNoNoiseWhereResidualsFallOrLittleWasSeen) {
+  Contraction one(1e-3, 1.5), steady(1e-3, 1.5), faster(1e-3, 1.5);
+  for (const double residual : {1e-1, 4e-3, 2e-3}) one.add(residual);  // 0.5; 0.04 from too far
+  ASSERT_TRUE(one.after(1e-3));
+  EXPECT_NEAR(*one.after(1e-3), 5e-4, 1e-12);
+  add_steps(steady, {4e-3, 3e-3}, 0.4, 0);
+  EXPECT_NEAR(*steady.after(2e-3), 8e-4, 1e-9);
+  for (const double residual : {4e-3, 2e-3, 1e-4}) faster.add(residual);  // the smaller the better
+  for (const Contraction* each : {&one, &steady, &faster}) EXPECT_LT(each->noise(), 1e-8);
+}
+
+TEST(Contraction, IsForgottenStepByStepAndWhereResidualsGrow) {
+  Contraction contraction(1e-3, 1.5);
+  add_steps(contraction, {2e-3, 3e-3}, 0.5, 0);  // 0.8 x 2 + 2 pairs
+  for (int step = 0; step < 5; ++step) contraction.begin_step();
+  EXPECT_TRUE(contraction.after(2e-3)) << "1.18 pairs are left";
   contraction.begin_step();
   EXPECT_FALSE(contraction.after(2e-3)) << "too long ago";
+  add_steps(contraction, {2e-3, 3e-3}, 0.5, 0);
+  contraction.add(1.4e-3);  // of 0.75e-3
+  EXPECT_FALSE(contraction.after(1.4e-3));
 }
 
 }  // namespace

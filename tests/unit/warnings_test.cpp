@@ -128,9 +128,10 @@ TEST(Warnings, SlowTrialsThatAnswerWithTheirEnd) {
   Case c = softening_case(0.05);
   c.material.type = MaterialType::volume_element;
   const Mesh mesh = rectangle_mesh(1, 2, 8, 16);
-  EXPECT_FALSE(says(warnings(c, mesh), "rough function")) << "the usual rate";
+  c.ve.inertial_number = 1e-2;
+  EXPECT_FALSE(says(warnings(c, mesh), "rough function"));
   c.ve.inertial_number = 2e-3;
-  EXPECT_TRUE(says(warnings(c, mesh), "ve.answer = \"mean\""));
+  EXPECT_TRUE(says(warnings(c, mesh), "leave ve.answer"));
   c.ve.answer = VeAnswer::mean;
   EXPECT_FALSE(says(warnings(c, mesh), "rough function"));
 }

@@ -30,8 +30,8 @@ from results import ResultsError
 CASE = HERE.parent / "solver" / "biaxial_ve.toml"
 HEIGHT, SIGMA_0, VELOCITY = 2.0, 1e5, 0.1
 NUMBERS = (2e-2, 5e-3, 2e-3, 1e-3, 5e-4)
-ANSWERS = {"end": (), "mean": ('ve.answer="mean"',), "late": ('ve.answer="mean"', "ve.mean_at=0.66666")}
-ENDS = {"": (), "learned": ('solver.last_correction="learned"',)}
+ANSWERS = {"end": ('ve.answer="end"',), "mean": ('ve.answer="mean"',), "late": ('ve.answer="mean"', "ve.mean_at=0.66666")}
+ENDS = {"": ('solver.last_correction="evaluated"',), "learned": ('solver.last_correction="learned"',)}
 INCREMENTS = {"": 0.02, "half": 0.01, "quarter": 0.005}  # s: 1e-3 of axial strain, ...
 
 
