@@ -134,9 +134,8 @@ void warn_of_identical_points(const Case& c, const BandModuli& moduli, std::vect
 void warn_of_rough_answers(const Case& c, std::vector<std::string>& out) {
   if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlowTrial) return;
   out.push_back(fmt::format(
-      "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: up to "
-      "three times the "
-      "evaluations, and rejected steps; leave ve.answer, solver.reuse_below and ve.hold_steps at their defaults",
+      "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: up to three times "
+      "the evaluations, and rejected steps; leave ve.answer, solver.reuse_below and ve.hold_steps at their defaults",
       c.ve.inertial_number));
 }
 
