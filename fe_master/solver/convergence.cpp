@@ -117,8 +117,8 @@ void Contraction::save(NamedArrays& arrays) const {
 
 void Contraction::load(const NamedArrays& arrays) {
   const auto& values = find_array(arrays, "solver.contraction");
-  std::copy_n(values.begin(), sums_.size(), sums_.begin());
   seen_ = values.at(sums_.size());
+  std::copy_n(values.begin(), sums_.size(), sums_.begin());
 }
 
 }  // namespace femxdem
