@@ -106,10 +106,12 @@ def table(lines):
 def rates(runs):
     """Lines of a table over the rate, of the runs by key that differ in it and in the packing alone: means of the packings and
     their standard errors; a straight line through each packing's rates to zero."""
-    chosen = {k: r for k, r in runs.items() if k.answer == "mean" and k == Key(k.spheres, k.number, "mean", mesh=k.mesh, seed=k.seed)}
-    lines = ["| elements, spheres | | " + " | ".join(f"I = {i:g}" for i in NUMBERS) + " | to I = 0 |", "|" + "---|" * (len(NUMBERS) + 3)]
-    for mesh, spheres in sorted({(k.mesh, k.spheres) for k in chosen}):
-        by_rate = {i: {k.seed: r for k, r in chosen.items() if (k.mesh, k.spheres, k.number) == (mesh, spheres, i)} for i in NUMBERS}
+    chosen = {k: r for k, r in runs.items()
+              if k.answer == "mean" and k == Key(k.spheres, k.number, "mean", mesh=k.mesh, seed=k.seed, ending=k.ending)}
+    lines = ["| elements, spheres, last corrections | | " + " | ".join(f"I = {i:g}" for i in NUMBERS) + " | to I = 0 |", "|" + "---|" * (len(NUMBERS) + 3)]
+    for mesh, spheres, ending in sorted({(k.mesh, k.spheres, k.ending) for k in chosen}):
+        alike = {k: r for k, r in chosen.items() if (k.mesh, k.spheres, k.ending) == (mesh, spheres, ending)}
+        by_rate = {i: {k.seed: r for k, r in alike.items() if k.number == i} for i in NUMBERS}
         if sum(len(found) > 1 for found in by_rate.values()) < 2:
             continue
         for what, of in READ.items():
@@ -117,7 +119,7 @@ def rates(runs):
             cells = [mean_and_error(list(found.values())) for found in values.values()]
             of_seed = {seed: [i for i in NUMBERS if np.isfinite(values[i].get(seed, np.nan))] for seed in (1, 2, 3)}
             zero = [np.polyfit(at, [values[i][seed] for i in at], 1)[1] for seed, at in of_seed.items() if len(at) > 2]
-            lines.append(f"| {mesh}, {spheres} | {what} | " + " | ".join(cells) + f" | {mean_and_error(zero)} |")
+            lines.append(f"| {mesh}, {spheres}, {ending or 'evaluated'} | {what} | " + " | ".join(cells) + f" | {mean_and_error(zero)} |")
     return lines
 
 
@@ -148,17 +150,19 @@ READ = {"peak / sigma_0": lambda run: float(curve(run.history())[1].max()), "at 
 
 
 def draw(curves, file):
-    """Colours: rates; a thin line for each packing; dashed: the end's stress; dotted: damping 0.7. Usual increments."""
+    """Colours: rates; a thin line for each packing; dashed: the end's stress; dotted: damping 0.7. Usual increments;
+    of 8x16 elements with learned last corrections."""
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), sharey=True)
     for axis, (spheres, mesh) in zip(axes, ((200, "4x8"), (1000, "4x8"), (1000, "8x16"))):
         labelled = set()
-        for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment, c[0].ending) == (spheres, mesh, "", "")):
+        ending = "learned" if mesh == "8x16" else ""
+        for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment, c[0].ending) == (spheres, mesh, "", ending)):
             strain, force = curve(history)
             style = "--" if key.answer == "end" else ":" if key.damping != 0.2 else "-"
             label = f"I = {key.number:g}, {key.answer}" + ", damping 0.7" * (style == ":")
             axis.plot(100 * strain, force, style, color=f"C{NUMBERS.index(key.number)}", linewidth=0.8, label=None if label in labelled else label)
             labelled.add(label)
-        axis.set(xlabel="axial strain [%]", title=f"{mesh} elements, {spheres} spheres")
+        axis.set(xlabel="axial strain [%]", title=f"{mesh} elements, {spheres} spheres" + f", {ending}" * bool(ending))
         if labelled:
             axis.legend(fontsize=6)
     axes[0].set(ylabel="force / (sigma_0 W)")
