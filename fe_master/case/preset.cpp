@@ -8,9 +8,9 @@ namespace femxdem {
 namespace {
 
 const std::map<VePreset, Preset> kPresets = {
-    {VePreset::fast, {"fast", 100, 2e-2, 10, 2e-3, 1e-2, 4, 0.082, 0.10, 0.21, 0.09}},
-    {VePreset::balanced, {"balanced", 400, 2e-2, 3, 1e-3, 5e-3, 6, 0.055, 0.079, 0.29, 0.058}},
-    {VePreset::accurate, {"accurate", 1000, 1e-2, 3, 5e-4, 5e-3, 8, 0.032, 0.023, 0.045, 0.033}}};
+    {VePreset::fast, {"fast", 100, 2e-2, 10, 2e-3, 1e-2, 4, 0.082, 0.11, 0.23, 0.093}},
+    {VePreset::balanced, {"balanced", 400, 5e-3, 3, 1e-3, 5e-3, 6, 0.067, 0.032, 0.12, 0.048}},
+    {VePreset::accurate, {"accurate", 1000, 5e-3, 3, 5e-4, 5e-3, 8, 0.031, 0.022, 0.058, 0.03}}};
 
 /// Largest displacement in a second [m/s]: of value x factor of a load of that kind.
 double fastest(const Load& load, double end_time) {
