@@ -26,6 +26,7 @@ ny = 1
 [ve]
 spheres = 100
 seed = 1
+answer = "end"
 [[load]]
 edge = "bottom"
 kind = "displacement"
