@@ -290,8 +290,8 @@ Section<SolverParameters> solver_section() {
                  "correction / displacement of the step; default 0.1 for volume elements, 1e-6 for closed forms"),
        word("last_correction", &S::last_correction, {"evaluated", "learned"},
             "default learned where ve.answer is mean, else evaluated; learned: where what a correction leaves is known "
-            "from the steps before to be within the tolerance, points "
-            "answer to the last one from their learned tangents, unevaluated"),
+            "from the steps before to be within the tolerance, points answer to the last one from their learned "
+            "tangents, unevaluated"),
        parameter(
            "tolerance_over_noise", &S::tolerance_over_noise, "", kNotNegative,
            "with learned last corrections: the residual that is to be expected may be so many times its noise, as "

@@ -77,8 +77,10 @@ void Contraction::begin_step() {
 }
 
 void Contraction::add(double residual) {
-  if (residual > kGrowth * last_) {
-    if (last_ > 0) seen_ = 0, sums_ = {};
+  const bool grows = last_ > 0 && residual > kGrowth * last_;
+  if (grows) {
+    seen_ = 0;
+    sums_ = {};
   } else if (near(last_)) {
     const double x = std::pow(last_ / tolerance_, 2), y = std::pow(residual / tolerance_, 2), w = std::pow(1 + x, -2);
     const std::array<double, 5> terms = {1, x, y, x * x, x * y};

@@ -153,9 +153,8 @@ def draw(curves, file):
     """Colours: rates; a thin line for each packing; dashed: the end's stress; dotted: damping 0.7. Usual increments;
     of 8x16 elements with learned last corrections."""
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), sharey=True)
-    for axis, (spheres, mesh) in zip(axes, ((200, "4x8"), (1000, "4x8"), (1000, "8x16"))):
+    for axis, (spheres, mesh, ending) in zip(axes, ((200, "4x8", ""), (1000, "4x8", ""), (1000, "8x16", "learned"))):
         labelled = set()
-        ending = "learned" if mesh == "8x16" else ""
         for (key, history) in (c for c in curves if (c[0].spheres, c[0].mesh, c[0].increment, c[0].ending) == (spheres, mesh, "", ending)):
             strain, force = curve(history)
             style = "--" if key.answer == "end" else ":" if key.damping != 0.2 else "-"

@@ -119,8 +119,8 @@ def mesh():
 
 def engine():
     ve = lambda n, i, *more: (f"ve.spheres={n}", f"ve.inertial_number={i}", *more)
-    rates = {100: ("2e-2", "1e-2", "5e-3"), 200: ("2e-2", "1e-2", "5e-3"), 400: ("2e-2", "1e-2", "5e-3"), 1000: ("2e-2", "1e-2", "5e-3")}
-    rows = [Setting(f"compact, {n}, {i}", ve(n, i), packings=(1, 2, 3)) for n in rates for i in rates[n]]
+    sizes_and_rates = product((100, 200, 400, 1000), ("2e-2", "1e-2", "5e-3"))
+    rows = [Setting(f"compact, {n}, {i}", ve(n, i), packings=(1, 2, 3)) for n, i in sizes_and_rates]
     rows.append(Setting("YADE, 100, 2e-2", ve(100, "2e-2", 've.engine="yade"'), packings=(1,)))
     return Chart("YADE, compact; spheres, rate", tuple(rows), {"ve": ("compact, 1000, 5e-3", "compact, 1000, 1e-2")}, over_packings=True)
 
