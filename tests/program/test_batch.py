@@ -16,6 +16,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation" / "cluster"))
 sys.dont_write_bytecode = True
 
+from making_steps import steps_in, wait_for_steps
 from same_results import differences
 
 FEMXDEM, CASES = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
@@ -36,8 +37,7 @@ class TwoJobs(unittest.TestCase):
         arguments = [str(FEMXDEM), "run", str(LAW), "--out", "mix", "--overwrite"]
         slow = ["--set", "control.step=1e-5", "--set", "control.max_step=1e-5"]
         first = subprocess.Popen(arguments + slow, cwd=FOLDER, stdout=subprocess.DEVNULL)
-        while not (FOLDER / "mix/history.csv").exists():
-            time.sleep(0.02)
+        wait_for_steps(first, FOLDER / "mix", 1)
         status, said = run(LAW, "--out", "mix", "--overwrite")
         self.assertEqual(status, 2)
         self.assertIn(f"process {first.pid} on", said)
@@ -51,23 +51,19 @@ class TwoJobs(unittest.TestCase):
 
 
 class ToldToEnd(unittest.TestCase):
-    STEPS = ["--set", "control.end_time=0.24", "--set", "control.step=4e-3", "--set", "control.max_step=4e-3",
+    STEPS = ["--set", "control.end_time=0.2", "--set", "control.step=1e-3", "--set", "control.max_step=1e-3",
              "--set", "output.checkpoint_every=0"]
 
     def start(self, *arguments):
         return subprocess.Popen([str(FEMXDEM), "run", str(LAW), *self.STEPS, *arguments], cwd=FOLDER,
                                 stdout=subprocess.PIPE, text=True)
 
-    def wait_for_rows(self, folder, count):
-        file = FOLDER / folder / "history.csv"
-        while not file.exists() or file.read_text().count("\n") <= count:
-            time.sleep(0.002)
-
     def test_it_saves_ends_with_75_and_goes_on_as_if_nothing_had_been(self):
         self.assertEqual(run(LAW, *self.STEPS, "--out", "untold")[0], 0)
         for number, name in enumerate((signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, signal.SIGHUP)):
+            before = steps_in(FOLDER / "told")
             job = self.start("--out", "told", "--restart" if number else "--overwrite")
-            self.wait_for_rows("told", 15 * number + 8)
+            wait_for_steps(job, FOLDER / "told", 8, before)
             job.send_signal(name)
             said = job.communicate(timeout=20)[0]
             self.assertEqual(job.returncode, 75, said)

@@ -20,6 +20,7 @@ FEMXDEM, CASE = Path(sys.argv[1]), Path(sys.argv[2])
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation" / "cluster"))
 sys.dont_write_bytecode = True
 
+from making_steps import steps_in, wait_for_steps
 from same_results import OF_THE_CLOCK, differences
 from same_results import rows as history
 
@@ -27,6 +28,7 @@ FOLDER = tempfile.TemporaryDirectory(prefix="femxdem_program_")
 CACHE = Path(FOLDER.name) / "packings"
 IN_ORDER = ("--set", "ve.sorted_contacts=true")  # sums of forces have the bits of compact cells
 YADE = ("--set", 've.engine="yade"')  # whose trials are processes
+MANY_STEPS = ("--set", "control.step=0.003", "--set", "control.max_step=0.003")  # 200, of 10 ms: time to strike a run at work
 
 
 def command(out, *arguments, ranks=1):
@@ -99,6 +101,8 @@ class Program(unittest.TestCase):
         cls.folder, status, said = run("reference")
         assert status == 0, said
         cls.reference = history(cls.folder)
+        cls.many_steps, status, said = run("many_steps", *MANY_STEPS)
+        assert status == 0, said
 
     def test_every_file_is_there(self):
         for name in ("results.h5", "results.xdmf", "history.csv", "summary.json", "case.toml", "log.txt", "checkpoint.h5"):
@@ -144,29 +148,25 @@ class Program(unittest.TestCase):
 
     def test_killed_rank_leaves_no_worker_and_the_restart_equals_the_uninterrupted_run(self):
         out = Path(FOLDER.name) / "restart"
-        mpirun = subprocess.Popen(command(out, ranks=2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while not ((out / "history.csv").exists() and len(history(out)) >= 3):
-            self.assertIsNone(mpirun.poll(), "the run ended before it could be killed")
-            time.sleep(0.02)
+        mpirun = subprocess.Popen(command(out, *MANY_STEPS, ranks=2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wait_for_steps(mpirun, out, 3)
         before = below(workers() | {r: mpirun.pid for r in ranks_of(mpirun)}, mpirun.pid)
         os.kill(ranks_of(mpirun)[0], signal.SIGKILL)
         mpirun.wait(timeout=60)  # it ends the other rank by SIGKILL, a second after the SIGTERM that ranks ignore
         time.sleep(1)
         self.assertEqual(before & workers().keys(), set())
-        self.assertLess(len(history(out)), 6)
-        _, status, said = run("restart", "--restart", ranks=2)
+        self.assertLess(steps_in(out), 200)
+        _, status, said = run("restart", *MANY_STEPS, "--restart", ranks=2)
         self.assertEqual(status, 0, said)
-        self.assertEqual(history(out), self.reference)
+        self.assertEqual(differences(self.many_steps, out), [])
 
     def test_told_to_end_by_a_signal_to_all_its_processes_it_goes_on_with_other_ranks(self):
-        out = Path(FOLDER.name) / "told"
-        for ranks, rows in ((2, 1), (4, 3)):  # SIGUSR1 by way of mpirun, then SIGTERM to every process but mpirun
-            how = ["--restart"] if ranks == 4 else []
-            mpirun = subprocess.Popen(command(out, "--set", "output.checkpoint_every=0", *how, ranks=ranks),
-                                      stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            while not ((out / "history.csv").exists() and len(history(out)) >= rows):
-                self.assertIsNone(mpirun.poll(), "the run ended before it was told to")
-                time.sleep(0.01)
+        out, settings = Path(FOLDER.name) / "told", (*MANY_STEPS, "--set", "output.checkpoint_every=0")
+        for ranks in (2, 4):  # SIGUSR1 by way of mpirun, then SIGTERM to every process but mpirun
+            before, how = steps_in(out), ["--restart"] if ranks == 4 else []
+            mpirun = subprocess.Popen(command(out, *settings, *how, ranks=ranks), stdout=subprocess.PIPE,
+                                      stderr=subprocess.STDOUT, text=True)
+            wait_for_steps(mpirun, out, 3, before)
             if ranks == 2:
                 mpirun.send_signal(signal.SIGUSR1)
             else:
@@ -174,10 +174,10 @@ class Program(unittest.TestCase):
                     os.kill(pid, signal.SIGTERM)
             said = mpirun.communicate(timeout=60)[0]
             self.assertEqual(mpirun.returncode, 75, said)
-        self.assertLess(len(history(out)), 6)
-        _, status, said = run("told", "--restart")
+        self.assertLess(steps_in(out), 200)
+        _, status, said = run("told", *settings, "--restart")
         self.assertEqual(status, 0, said)
-        self.assertEqual(differences(Path(FOLDER.name) / "reference", out), [])
+        self.assertEqual(differences(self.many_steps, out), [])
 
     def test_a_killed_trial_does_not_change_the_result(self):
         out, remarks = Path(FOLDER.name) / "killed", Path(FOLDER.name) / "remarks.txt"
