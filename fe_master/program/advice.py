@@ -17,9 +17,16 @@ ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH = 4, 14  # across a band (validation/clos
 # Error of the curve by the tolerance (validation/solver, before localisation, three seeds; 1e-2: between 0.7 % of
 # validation/advise and 2.8 % of validation/speed_accuracy).
 TOLERANCES = ((1e-2, 0.014), (5e-3, 0.005), (1e-3, 0.0025))
-# Evaluations a step at 1000 spheres, I = 2e-2, tolerance 5e-3, and powers of 1000/spheres, 2e-2/I and 5e-3/tolerance: within
-# 15 % of the runs of validation/biaxial, solver and quasi_static.
-BEFORE, PAST = (1.9, 0.08, 0.25, 0.33), (2.4, 0.20, 0.35, 0.27)
+# Evaluations a step before the peak and past it, by ve.answer and solver.last_correction: at 1000 spheres, I = 2e-2, tolerance
+# 5e-3, and powers of 1000/spheres, 2e-2/I and 5e-3/tolerance. Least squares of the runs of validation/biaxial, solver and
+# quasi_static.
+EVALUATIONS = {
+    ("end", "evaluated"): ((1.9, 0.08, 0.25, 0.33), (2.4, 0.20, 0.35, 0.27)),
+    ("mean", "evaluated"): ((1.57, 0.33, 0.14, 0.33), (1.78, 0.25, 0.27, 0.27)),
+    ("end", "learned"): ((1.44, 0.16, 0.16, 0.31), (1.95, 0.11, 0.14, 0.24)),
+    ("mean", "learned"): ((1.34, 0.14, 0.05, 0.31), (1.84, 0.12, 0.13, 0.24)),
+}
+ENDS = ("end", "evaluated")  # as single volume elements are strained
 BYTES_A_SPHERE = 2700.0  # of a point in compact cells: committed state, spare ones, contacts that grew (validation/biaxial, 128)
 BYTES_A_SPHERE_YADE = 10_000.0  # of a volume element in YADE with its trial (validation/engine)
 BYTES_OF_PROGRAM = 1.0e8  # and as much for YADE in its worker (validation/advise)
@@ -165,9 +172,9 @@ def modulus_for(thickness, sigma_0):
     return BAND[1] * sigma_0 * (thickness / BAND[0]) ** 2
 
 
-def evaluations(spheres, inertial_number, tolerance, past):
-    """Mean evaluations a step, past the peak or before it."""
-    at, by_spheres, by_rate, by_tolerance = PAST if past else BEFORE
+def evaluations(spheres, inertial_number, tolerance, past, answers=ENDS):
+    """Mean evaluations a step, past the peak or before it; answers: (ve.answer, solver.last_correction)."""
+    at, by_spheres, by_rate, by_tolerance = EVALUATIONS[answers][past]
     found = at * (1000 / spheres) ** by_spheres * (2e-2 / inertial_number) ** by_rate * (5e-3 / tolerance) ** by_tolerance
     return max(1.0, found)
 
@@ -207,11 +214,11 @@ class Cost:
         return max(1, math.floor(min(self.dem_seconds / max(self.serial_seconds, 1e-9), points / busiest)))
 
 
-def cost_of_run(path, points, spheres, inertial_number, tolerance, min_steps, strained, step_seconds, compact):
+def cost_of_run(path, points, spheres, inertial_number, tolerance, min_steps, strained, step_seconds, compact, answers=ENDS):
     """Cost of a run of one step for each step of the Path; from where the stress stops rising the share `strained` of the
     points strains. step_seconds: of a DEM step of one point."""
     past = path.strain > stops_rising(path)
-    after, before = (evaluations(spheres, inertial_number, tolerance, when) for when in (True, False))
+    after, before = (evaluations(spheres, inertial_number, tolerance, when, answers) for when in (True, False))
     number = np.where(past, after, max(1.0, path.eased * before))
     trial = np.where(past, *(steps_of_a_trial(path.steps_needed, min_steps, share) for share in (strained, 1.0)))
     number, trial = number[1:], trial[1:]  # the first row is the start

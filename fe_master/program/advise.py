@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from advice import (
-    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, Differences, band_thickness, cost_of_run, eased_by, elastic_until,
+    CHECKPOINT_FACTOR, ELEMENTS_FOR_FORCE, ELEMENTS_FOR_WIDTH, ENDS, Differences, band_thickness, cost_of_run, eased_by, elastic_until,
     loading_path, mean_path, modulus_for, path_of, rate_for, scatter, scatter_constant, softening, spheres_for,
     stops_rising, strained_share, toml_value, tolerance_for, with_values,
 )
@@ -127,8 +127,9 @@ def percent(x):
     return f"{100 * x:.2g} %"
 
 
-def advise(case, file, program, folder, error, band, points):
-    """The Advice on a case (dictionary) of that file and number of material points."""
+def advise(case, file, program, folder, error, band, sets):
+    """The Advice on a case (dictionary) of that file and values of --set."""
+    points, answers = checked(program, case, file, sets)
     probes, said = Probes(program, case, file, folder), Advice()
     base = probes.first(case.get("solver", {}).get("tolerance", 5e-3))
     manifest, engine, ve = probes.manifest, probes.summary["engine"], probes.effective["ve"]
@@ -151,14 +152,15 @@ def advise(case, file, program, folder, error, band, points):
     say_softening(said, case, base, band, ve)
     say_not_needed(said, compared, usual, base, ve, limit, manifest["moments"] and ve["moments"], probes.engine, off)
     if points:
-        own = predicted(base, case, points, spheres, ve["inertial_number"], given, ve["min_steps"], engine)
+        own = predicted(base, case, points, spheres, ve["inertial_number"], given, ve["min_steps"], engine, answers)
         say_cost(said, "as it is", own, points)
         said.numbers["cost"] = {**vars(own), "core_hours": own.core_hours}
         advised = said.values.get(("ve", "spheres"), spheres)
         path = probes.run("increment_advised", coarser=factor) if factor > 1 else base
         slower = replace(path, steps_needed=path.steps_needed * ve["inertial_number"] / rate)
         larger = advised / spheres
-        cost = predicted(slower, case, points, advised, rate, tolerance, ve["min_steps"], engine, larger)
+        _, answers = checked(program, case, file, [*sets, f"ve.inertial_number={rate:g}"])
+        cost = predicted(slower, case, points, advised, rate, tolerance, ve["min_steps"], engine, answers, larger)
         say_cost(said, "as advised", cost, points)
     return said
 
@@ -269,9 +271,10 @@ def share_strained(case):
     return strained_share(band_thickness(D, sigma_0) if D else 1.5 * mesh["height"] / mesh["ny"], mesh["height"])
 
 
-def predicted(path, case, points, spheres, rate, tolerance, min_steps, engine, larger=1.0):
+def predicted(path, case, points, spheres, rate, tolerance, min_steps, engine, answers, larger=1.0):
     """Cost of the run of `case`; larger: spheres of the run over those of the Path."""
-    return cost_of_run(path, points, spheres, rate, tolerance, min_steps, share_strained(case), larger * path.step_seconds, engine == "compact")
+    return cost_of_run(path, points, spheres, rate, tolerance, min_steps, share_strained(case), larger * path.step_seconds,
+                       engine == "compact", answers)
 
 
 def say_cost(said, name, cost, points):
@@ -280,13 +283,17 @@ def say_cost(said, name, cost, points):
              f"{cost.ranks_that_pay(points, BUSIEST)} cores pay")
 
 
-def points_of(program, file, sets):
-    """Material points of the case's mesh; 0 for a case without loads. Raises AdviceError with the first mistake of a case."""
-    said = _start([program, "check", file, *_settings(sets)])
-    if said.returncode != 0 and re.search(r"^\s*\[\[load\]\]", file.read_text(), re.MULTILINE):
+def checked(program, case, file, sets):
+    """Material points of the case's mesh, 0 for a case without loads, and what its run answers with: (ve.answer,
+    solver.last_correction). Raises AdviceError with the first mistake of a case."""
+    said = _start([program, "check", "--effective", file, *_settings(sets)])
+    if said.returncode == 0:
+        effective = tomllib.loads(said.stdout)
+        points = int(re.search(r"(\d+) material points", said.stdout).group(1))
+        return points, (effective["ve"]["answer"], effective["solver"]["last_correction"])
+    if case.get("load"):
         raise AdviceError((said.stderr.strip() or said.stdout.strip()).splitlines()[0])
-    found = re.search(r"(\d+) material points", said.stdout)
-    return int(found.group(1)) if found else 0
+    return 0, ENDS
 
 
 def read(file, sets):
@@ -331,7 +338,7 @@ def main():
         case = read(a.case, a.sets)
         folder = (a.out or Path("out") / (a.case.stem + "_advice")).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        said = advise(case, a.case.resolve(), program, folder, a.error, a.band, points_of(program, a.case, a.sets))
+        said = advise(case, a.case.resolve(), program, folder, a.error, a.band, a.sets)
         print(said)
         values = {".".join(key): value for key, value in said.values.items()}
         (folder / "advice.json").write_text(json.dumps({"advice": said.lines, "values": values, **said.numbers}, indent=1))

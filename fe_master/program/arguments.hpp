@@ -21,6 +21,7 @@ struct Arguments {
   int noise_samples = 0;                ///< ve path: probes of the stress's jitter in each step
   int compare = 0;                      ///< ve prepare: DEM steps beside the scene's own continuation in YADE
   bool markdown = false;
+  bool effective = false;  ///< check: print the case as it would run
   std::string command_line;
 };
 

@@ -139,8 +139,9 @@ int run(const Arguments& arguments) {
 int check(const Arguments& arguments) {
   const Case c = read_case(arguments.file, arguments.overrides);
   const Mesh mesh = make_mesh(c.mesh, c.regions);
-  std::cout << c.file << ": no mistakes; " << mesh.elements.size() << " elements, "
+  std::cout << (arguments.effective ? "# " : "") << c.file << ": no mistakes; " << mesh.elements.size() << " elements, "
             << kPointsPerElement * mesh.elements.size() << " material points\n";
+  if (arguments.effective) std::cout << effective_toml(c);
   return kDone;
 }
 
@@ -201,7 +202,8 @@ void add_commands(CommandLine& line) {
   add_restart(*run_it, arguments);
   run_it->add_flag("--overwrite", arguments.overwrite, "Replace results that are already there");
   add_progress(*run_it, arguments);
-  add_case_command(line, line.app, "check", "Say all mistakes of a case file, without running it", check);
+  add_case_command(line, line.app, "check", "Say all mistakes of a case file, without running it", check)
+      ->add_flag("--effective", arguments.effective, "And the case as it would run, every default written out");
   add_command(line, line.app, "parameters", "Every parameter: unit, default, bounds, text", parameters)
       ->add_flag("--markdown", arguments.markdown, "As Markdown: fe_master/program/parameters.md");
 }

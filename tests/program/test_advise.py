@@ -71,9 +71,12 @@ class Advise(unittest.TestCase):
     def test_refusals(self):
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "law.toml").write_text('[material]\ntype = "elastic"\nyoung = 1e8\n')
+            (Path(folder) / "theirs.py").write_text(SCRIPT)
+            (Path(folder) / "mistaken.toml").write_text(CASE.replace("step = 0.05", "step = -0.05"))
             for words, reason in (
                 (["nothere.toml"], "nothere.toml: no such file"), (["law.toml"], "a law in closed form, which needs no advice"),
                 (["law.toml", "--error", "2"], "--error 2: a relative error"), (["law.toml", "--band", "-1"], "--band -1: a thickness"),
+                (["mistaken.toml"], "control.step"),
             ):
                 said = subprocess.run([PROGRAM, "advise", *words], cwd=folder, capture_output=True, text=True)
                 self.assertEqual((said.returncode, len(said.stderr.splitlines())), (2, 1), said.stderr)

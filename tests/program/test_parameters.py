@@ -1,5 +1,7 @@
 """The written documents hold what the program says: parameters.md, and the case in the README.
 
+`femxdem check --effective` writes a case that is itself.
+
 usage: test_parameters.py FEMXDEM ROOT
 """
 
@@ -34,10 +36,21 @@ def mistakes_of_written_cases(femxdem, document):
     return said
 
 
+def effective_differs(femxdem, case):
+    """Difference between the effective case and its own effective case, as text."""
+    say = lambda file: subprocess.run([femxdem, "check", "--effective", file], check=True, capture_output=True, text=True).stdout
+    with tempfile.TemporaryDirectory() as folder:
+        written = Path(folder) / "effective.toml"
+        written.write_text(say(case))
+        once, twice = (text.splitlines(True)[1:] for text in (written.read_text(), say(written)))  # the first names the file
+    return "".join(difflib.unified_diff(once, twice, "effective", "effective of it", n=0))
+
+
 if __name__ == "__main__":
     femxdem, root = sys.argv[1], Path(sys.argv[2])
     differences = reference_differs(femxdem, root)
     if differences:
         differences += "make it anew: femxdem parameters --markdown > fe_master/program/parameters.md\n"
     differences += mistakes_of_written_cases(femxdem, root / "README.md")
+    differences += effective_differs(femxdem, root / "tests" / "program" / "small.toml")
     sys.exit(differences or None)

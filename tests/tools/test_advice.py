@@ -89,16 +89,21 @@ class Bands(unittest.TestCase):
 
 
 class Cost(unittest.TestCase):
-    MEASURED = (  # spheres, I, tolerance, evaluations before and past: validation/biaxial, solver, quasi_static
+    MEASURED = (  # spheres, I, tolerance, evaluations before and past: validation/biaxial, solver, quasi_static, advise
         (1000, 2e-2, 5e-3, 1.81, 2.38), (1000, 5e-3, 5e-3, 2.59, 3.92), (200, 2e-2, 5e-3, 2.25, 3.15),
         (200, 2e-2, 1e-3, 3.81, 4.83), (100, 2e-2, 5e-3, 2.44, 3.80), (100, 1e-2, 1e-2, 2.13, 4.39),
     )  # fmt: skip
+    LEARNED = (  # with ve.answer = "mean" and solver.last_correction = "learned"; means of the packings
+        (1000, 2e-2, 5e-3, 1.41, 1.83), (1000, 5e-3, 5e-3, 1.42, 2.18), (1000, 2e-3, 5e-3, 1.50, 2.30),
+        (200, 2e-3, 5e-3, 2.02, 2.94), (1000, 5e-3, 1e-3, 2.38, 2.74), (200, 5e-3, 1e-3, 2.72, 4.69),
+    )  # fmt: skip
 
     def test_evaluations_of_finished_runs(self):
-        for spheres, rate, tolerance, before, past in self.MEASURED:
-            for measured, after in ((before, False), (past, True)):
-                ratio = advice.evaluations(spheres, rate, tolerance, after) / measured
-                self.assertTrue(1 / 1.2 < ratio < 1.2, (spheres, rate, tolerance, after, ratio))
+        for runs, answers in ((self.MEASURED, ("end", "evaluated")), (self.LEARNED, ("mean", "learned"))):
+            for spheres, rate, tolerance, before, past in runs:
+                for measured, after in ((before, False), (past, True)):
+                    ratio = advice.evaluations(spheres, rate, tolerance, after, answers) / measured
+                    self.assertTrue(1 / 1.2 < ratio < 1.2, (spheres, rate, tolerance, after, answers, ratio))
 
     def test_steps_of_a_trial(self):
         self.assertEqual(advice.steps_of_a_trial(12.0, 10, 1.0), 12)

@@ -31,8 +31,10 @@ ROWS = {  # advised and run: name: (case, settings of advice and run, seeds of t
 FINISHED = {  # what one probe tells of runs that are done: (case, settings, evaluations, DEM steps, its page)
     "demo": ("../biaxial/demo.toml", [], 177, 2.40e6, "biaxial"),
     "biaxial_ve": ("../solver/biaxial_ve.toml", [], 301, 2.15e6, "solver"),
-    "128": ("../biaxial/128.toml", [], 229, 1.67e6, "biaxial"),
-    "512": ("../biaxial/512.toml", [], 262, 7.67e6, "biaxial"),
+    "128": ("../biaxial/128.toml", [], 217, 1.57e6, "biaxial"),
+    "512": ("../biaxial/512.toml", [], 272, 7.99e6, "biaxial"),
+    "rate_5e-3": ("../biaxial/128.toml", ["ve.inertial_number=5e-3"], 211, 4.65e6, "biaxial"),
+    "rate_2e-3": ("../biaxial/128.toml", ["ve.inertial_number=2e-3"], 223, 1.16e7, "biaxial"),
     "200_tol_1e-3": ("../solver/biaxial_ve.toml", ["solver.tolerance=1e-3"], 467, 3.38e6, "solver"),
 }
 ERRORS = {  # of the mean of three runs of 400 spheres: what is told, the settings compared, those they are compared with
@@ -98,11 +100,11 @@ def finished(c, name):
         folder.mkdir(parents=True, exist_ok=True)
         given = advise.read(file, [*settings, c.cache])
         probes = advise.Probes(str(c.program), given, file, folder)
-        path, points = probes.first(given["solver"].get("tolerance", 5e-3)), advise.points_of(str(c.program), file, [])
-        ve = probes.effective["ve"]
         tolerance = given["solver"].get("tolerance", 5e-3)
+        path, ve = probes.first(tolerance), probes.effective["ve"]
+        points, answers = advise.checked(str(c.program), given, file, settings)
         engine = probes.summary["engine"]
-        return vars(advise.predicted(path, given, points, ve["spheres"], ve["inertial_number"], tolerance, ve["min_steps"], engine))
+        return vars(advise.predicted(path, given, points, ve["spheres"], ve["inertial_number"], tolerance, ve["min_steps"], engine, answers))
 
     found = c.value(f"{name}_cost", {"case": file.read_text(), "settings": settings}, cost)
     pairs = (found["evaluations"], evaluations), (found["dem_steps"], dem_steps)
