@@ -13,9 +13,7 @@ namespace femxdem {
 namespace {
 
 std::string header(const std::vector<std::string>& monitors) {
-  std::string line = "step,time,load_factor,iterations,evaluations,dem_steps,histories,residual";
-  for (const std::string& name : monitors) line += "," + name;
-  return line + ",dem_seconds,wall_s\n";
+  return fmt::format("{}\n", fmt::join(history_columns(monitors), ","));
 }
 
 /// Header and rows up to the last step; a row that a killed run left unfinished lacks columns and is dropped.
@@ -36,6 +34,14 @@ std::string kept_rows(const std::filesystem::path& file, const std::string& expe
 }
 
 }  // namespace
+
+std::vector<std::string> history_columns(const std::vector<std::string>& own) {
+  std::vector<std::string> names = {"step",        "time",      "load_factor", "iterations",
+                                    "evaluations", "dem_steps", "histories",   "residual"};
+  names.insert(names.end(), own.begin(), own.end());
+  names.insert(names.end(), {"dem_seconds", "wall_s"});
+  return names;
+}
 
 History::History(const std::filesystem::path& file, const std::vector<std::string>& monitors, Existing existing,
                  int last_step)

@@ -24,6 +24,9 @@ struct StepRecord {
   std::vector<double> monitors;  ///< in the order of the names given to History
 };
 
+/// All names of the columns of history.csv; `own`: those of the run, which stand between the residual and the clocks.
+std::vector<std::string> history_columns(const std::vector<std::string>& own);
+
 /// history.csv: one row for each converged step, on the disk as soon as it is added. Numbers have 17 digits, so that
 /// equal bits give equal text; the columns that depend on the clock come last: dem_seconds, wall_s.
 class History {

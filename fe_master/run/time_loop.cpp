@@ -38,8 +38,6 @@ class TimeLoop {
   bool told_to_end();
   std::string stopped();
   std::string place(std::size_t point) const;
-  bool reuses() const { return case_.solver.reuse_below > 0; }
-  bool learns_ends() const { return case_.solver.last_correction == LastCorrection::learned; }
   std::vector<std::string> columns() const;
   std::string reuse_account() const;
   std::string learned_ends_account() const;
@@ -201,11 +199,11 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
   record_.wall_seconds = files_.wall();
   record_.monitors = monitor_values(case_, problem_.formulation(), now);
   reuse_of_step_.error = last_.table.back().reuse_error;
-  if (reuses()) {
+  if (reuses(case_.solver)) {
     record_.monitors.push_back(static_cast<double>(reuse_of_step_.answers));
     record_.monitors.push_back(reuse_of_step_.error);
   }
-  if (learns_ends()) {
+  if (learns_ends(case_.solver)) {
     record_.monitors.push_back(last_.tolerance);
     record_.monitors.push_back(last_.learned_at_end);
     learned_ends_.steps += last_.learned_at_end;
@@ -233,14 +231,13 @@ void TimeLoop::accept(Equilibrium start, const std::vector<IterationRecord>& tab
 /// Of history.csv, beside those of every run.
 std::vector<std::string> TimeLoop::columns() const {
   std::vector<std::string> names = monitor_names(case_);
-  if (reuses()) names.insert(names.end(), {"reused", "reuse_error"});
-  if (learns_ends()) names.insert(names.end(), {"tolerance", "learned_end"});
+  for (const std::string& name : columns_of(case_.solver)) names.push_back(name);
   return names;
 }
 
 /// What learned tangents have spared the points, and what it may have cost.
 std::string TimeLoop::reuse_account() const {
-  if (!reuses()) return "";
+  if (!reuses(case_.solver)) return "";
   const double answers = static_cast<double>(files_.summary.evaluations) * static_cast<double>(points_.size());
   return fmt::format("; {:.1f} % of the answers from learned tangents, their error at most {:.1e} of the forces",
                      100 * static_cast<double>(reuse_.answers) / answers, reuse_.error);
@@ -248,7 +245,7 @@ std::string TimeLoop::reuse_account() const {
 
 /// How many steps have ended without an evaluation of the last correction, and what they were held against.
 std::string TimeLoop::learned_ends_account() const {
-  if (!learns_ends()) return "";
+  if (!learns_ends(case_.solver)) return "";
   const std::string ends = fmt::format("; the last correction of {} of them by learned tangents", learned_ends_.steps);
   if (learned_ends_.raised == 0) return ends;
   return ends + fmt::format(", in {} with the tolerance raised by the residual's noise, at most to {:.1e}",
@@ -275,9 +272,9 @@ void TimeLoop::keep_state() {
   solver_.save(state_.arrays);
   control_.save(state_.arrays);
   files_.save(state_.arrays);
-  if (reuses())
+  if (reuses(case_.solver))
     state_.arrays.emplace_back("run.reuse", std::vector<double>{static_cast<double>(reuse_.answers), reuse_.error});
-  if (learns_ends())
+  if (learns_ends(case_.solver))
     state_.arrays.emplace_back("run.learned_ends",
                                std::vector<double>{static_cast<double>(learned_ends_.steps),
                                                    static_cast<double>(learned_ends_.raised), learned_ends_.tolerance});
@@ -335,11 +332,11 @@ void TimeLoop::restart() {
   files_.load(then.step, then.arrays);
   files_.checkpoint_written();
   files_.whole(then.time);
-  if (reuses()) {
+  if (reuses(case_.solver)) {
     const auto& reuse = find_array(then.arrays, "run.reuse");
     reuse_ = {static_cast<long>(reuse.at(0)), reuse.at(1)};
   }
-  if (learns_ends()) {
+  if (learns_ends(case_.solver)) {
     const auto& ends = find_array(then.arrays, "run.learned_ends");
     learned_ends_ = {static_cast<int>(ends.at(0)), static_cast<int>(ends.at(1)), ends.at(2)};
   }

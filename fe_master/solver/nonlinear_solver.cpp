@@ -78,7 +78,7 @@ NonlinearSolver::NonlinearSolver(Formulation& formulation, MaterialPoints& point
       operators_(parameters, committed_.responses, formulation.strain_components()),
       reuse_(parameters.reuse_below, points.size()),
       contraction_(parameters.tolerance, parameters.tolerance_over_noise),
-      lagging_(parameters.last_correction == LastCorrection::learned, points_),
+      lagging_(learns_ends(parameters), points_),
       penalty_(parameters.penalty * committed_.responses.front().stiffness(pair(0, 0), pair(0, 0))) {
   assert(parameters.reuse_below == 0 || parameters.answer_at == 1);
   points_.commit();
@@ -449,7 +449,7 @@ void NonlinearSolver::save(NamedArrays& arrays) const {
   formulation_.save(arrays);
   operators_.save(arrays);
   reuse_.save(arrays);
-  if (parameters_.last_correction == LastCorrection::learned) contraction_.save(arrays);
+  if (learns_ends(parameters_)) contraction_.save(arrays);
   lagging_.save(arrays);
   arrays.emplace_back("solver.time", std::vector<double>{committed_.time, last_.dt, committed_.load_factor,
                                                          last_.load_factor, start_.time, start_.load_factor});
@@ -475,7 +475,7 @@ void NonlinearSolver::load(const NamedArrays& arrays) {
   formulation_.load(arrays);
   operators_.load(arrays);
   reuse_.load(arrays);
-  if (parameters_.last_correction == LastCorrection::learned) contraction_.load(arrays);
+  if (learns_ends(parameters_)) contraction_.load(arrays);
   lagging_.load(arrays);
   const auto& time = find_array(arrays, "solver.time");
   committed_.time = time.at(0);

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "given.hpp"
 
 namespace femxdem {
@@ -39,6 +42,17 @@ struct SolverParameters {
   double answer_at = 1;  ///< fraction of a trial that the points' stress belongs to; not of the case: answer_at(ve) [-]
   double penalty = 1e4;  ///< augmented Lagrangian: r / elastic C_1111 of the first point [-]
 };
+
+inline bool reuses(const SolverParameters& p) { return p.reuse_below > 0; }
+inline bool learns_ends(const SolverParameters& p) { return p.last_correction == LastCorrection::learned; }
+
+/// Columns of history.csv in which a step tells what learned tangents answered.
+inline std::vector<std::string> columns_of(const SolverParameters& parameters) {
+  std::vector<std::string> names;
+  if (reuses(parameters)) names.insert(names.end(), {"reused", "reuse_error"});
+  if (learns_ends(parameters)) names.insert(names.end(), {"tolerance", "learned_end"});
+  return names;
+}
 
 /// With tolerances where none are given: 5e-3 (force) and 0.1 (displacement) for volume elements, whose noise allows no
 /// less at a few evaluations; 1e-8 and 1e-6 for laws in closed form.
