@@ -59,6 +59,8 @@ struct Case {
   std::vector<PathSegment> path;
 };
 
+inline bool on_volume_elements(const Case& c) { return c.material.type == MaterialType::volume_element; }
+
 /// What a case file must be complete for.
 enum class Purpose {
   run,       ///< a boundary value problem: mesh, control, ...

@@ -12,7 +12,6 @@
 #include "formulation.hpp"
 #include "history.hpp"
 #include "mesh.hpp"
-#include "preset.hpp"
 
 namespace femxdem {
 
@@ -23,8 +22,6 @@ namespace {
 constexpr double kNoiseMargin = 30;
 
 using Keys = std::vector<std::string>;
-
-bool volume_elements(const Case& c) { return c.material.type == MaterialType::volume_element; }
 
 /// Keys that belong to another choice than the one made.
 void refuse(Mistakes& m, const std::string& section, const Keys& keys, const std::string& choice) {
@@ -168,7 +165,7 @@ void check_material(const Case& c, Mistakes& m) {
   if (!m.wrong("material.type")) require(m, "material", needed_by(c.material.type), "for this material.type");
   if (c.material.dilatancy_angle > c.material.friction_angle)
     m.add("material.dilatancy_angle", "material.dilatancy_angle is above friction_angle; lower it");
-  if (volume_elements(c)) {
+  if (on_volume_elements(c)) {
     if (!c.material_regions.empty())
       m.add("material.region", "[[material.region]] is of no use with volume elements; use [[ve.region]]");
   } else if (!c.ve_regions.empty()) {
@@ -289,13 +286,8 @@ void check_control_measure(const Case& c, const std::optional<std::set<std::stri
   }
 }
 
-bool learns_whole_corrections(const SolverParameters& solver) {
-  return solver.global_operator == GlobalOperator::quasi_newton && !solver.line_search &&
-         solver.acceleration == Acceleration::none;
-}
-
 void check_solver(const Case& c, Mistakes& m) {
-  if (volume_elements(c) && c.solver.global_operator == GlobalOperator::tangent)
+  if (on_volume_elements(c) && c.solver.global_operator == GlobalOperator::tangent)
     m.add("solver.operator",
           "solver.operator = \"tangent\" needs a law in closed form; for volume elements use "
           "quasi_newton, elastic or perturbation");
@@ -308,7 +300,7 @@ void check_solver(const Case& c, Mistakes& m) {
   if (reuses(c.solver) && c.solver.global_operator != GlobalOperator::quasi_newton)
     m.add("solver.reuse_below",
           "solver.reuse_below needs learned tangents; set solver.operator = \"quasi_newton\", or reuse_below = 0");
-  if (reuses(c.solver) && volume_elements(c) && c.ve.answer == VeAnswer::mean)
+  if (reuses(c.solver) && on_volume_elements(c) && c.ve.answer == VeAnswer::mean)
     m.add("solver.reuse_below",
           "solver.reuse_below is for answers of a trial's end; set ve.answer = \"end\", or reuse_below = 0");
   if (learns_ends(c.solver) && !learns_whole_corrections(c.solver))
@@ -401,36 +393,6 @@ void require_known(const std::string& name, const std::set<std::string>& known, 
                          !near.empty()  ? fmt::format("did you mean '{}'?", near)
                          : list.empty() ? nothing_named(noun)
                                         : fmt::format("the {}s are {}", noun, list)));
-}
-
-/// Slow trials of a boundary value problem answer with their mean, and where points do, a step's last correction is
-/// learned: the choice of validation/quasi_static. A single element is drawn beside YADE's own tests: its ends.
-void complete_answers(Case& c, Purpose purpose, const Mistakes& m) {
-  const bool has_mean = c.ve.hold_steps == 0 && c.solver.reuse_below == 0;
-  if (!m.has("ve.answer") && purpose == Purpose::run && has_mean && c.ve.inertial_number <= kSlowTrial)
-    c.ve.answer = VeAnswer::mean;
-  if (!m.has("solver.last_correction") && c.ve.answer == VeAnswer::mean && learns_whole_corrections(c.solver))
-    c.solver.last_correction = LastCorrection::learned;
-}
-
-void complete_case(Case& c, Purpose purpose, const Mistakes& m) {
-  const bool ve = volume_elements(c);
-  if (!m.has("solver.operator")) c.solver.global_operator = ve ? GlobalOperator::quasi_newton : GlobalOperator::tangent;
-  complete_by_preset(c, m);
-  c.solver = with_default_tolerances(c.solver, ve);
-  if (!is_given(c.control.min_step)) c.control.min_step = c.control.step / 64.0;
-  if (!is_given(c.control.max_step)) c.control.max_step = c.control.step;
-  const auto complete_ve = [&](VeParameters& v, const auto& given) {
-    if (v.contact_law == ContactLaw::friction && !given("cohesion")) v.cohesion = 0.0;
-    complete_by_preset(v, given);
-    if (!v.cache.empty()) v.cache = (std::filesystem::path(c.file).parent_path() / v.cache).lexically_normal().string();
-  };
-  const auto given = [&m](const std::string& key) { return m.has("ve." + key); };
-  complete_ve(c.ve, given);
-  for (std::size_t i = 0; i < c.ve_regions.size(); ++i)
-    complete_ve(c.ve_regions[i].ve,
-                [&](const std::string& key) { return given(key) || m.has(fmt::format("ve.region.{}.{}", i, key)); });
-  if (ve) complete_answers(c, purpose, m);
 }
 
 void check_case(const Case& c, Purpose purpose, Mistakes& m) {

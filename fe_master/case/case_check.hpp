@@ -11,10 +11,6 @@
 
 namespace femxdem {
 
-/// Gives the parameters whose default depends on others, or on the purpose, their values; `mistakes` knows which keys
-/// the file has.
-void complete_case(Case& c, Purpose purpose, const Mistakes& mistakes);
-
 /// Adds what is missing or contradictory between parameters. Builds the mesh, where it can, to know its edges.
 void check_case(const Case& c, Purpose purpose, Mistakes& mistakes);
 

@@ -1,5 +1,7 @@
 #include "case_parameters.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace femxdem {
@@ -42,7 +44,7 @@ Parameter<S> path(const char* key, std::string S::*member, const char* text) {
 
 /// A word of a list that names the values of an enumeration, in order; an empty word stands for "not given".
 template <class S, class E>
-Parameter<S> word(const char* key, E S::*member, const Words& words, const char* text) {
+Parameter<S> word(const char* key, E S::*member, const Words& words, const std::string& text) {
   return {key,
           Kind::word,
           "",
@@ -184,8 +186,9 @@ std::vector<Parameter<VeParameters>> trial_parameters() {
   return {
       parameter("inertial_number", &V::inertial_number, "", {1e-7, 1.0}, "rate a sqrt(rho / p) of a trial"),
       word("answer", &V::answer, {"end", "mean"},
-           "stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all curves do; "
-           "default mean where a boundary value problem has inertial_number <= 5e-3, else end"),
+           fmt::format("stress of a trial: that of its end, or the mean over it, which belongs to mid-step as then all "
+                       "curves do; default mean where a boundary value problem has inertial_number <= {:g}, else end",
+                       kSlowTrial)),
       parameter("mean_at", &V::mean_at, "", {0.5, 2.0 / 3},
                 "where in the step the mean belongs: 0.5 all alike; beyond, later stresses weigh more"),
       parameter("time_step_safety", &V::time_step_safety, "", {0.01, 1.0}, "DEM time step / critical one"),

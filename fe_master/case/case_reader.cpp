@@ -10,6 +10,7 @@
 
 #include "case.hpp"
 #include "case_check.hpp"
+#include "case_completion.hpp"
 #include "case_mistakes.hpp"
 #include "case_parameters.hpp"
 #include "errors.hpp"

@@ -40,7 +40,7 @@ double strain_rate(const Case& c) {
 }
 
 void complete_by_preset(Case& c, const Mistakes& mistakes) {
-  if (c.ve.preset == VePreset::none || c.material.type != MaterialType::volume_element) return;
+  if (c.ve.preset == VePreset::none || !on_volume_elements(c)) return;
   const Preset& values = preset(c.ve.preset);
   if (!mistakes.has("solver.tolerance")) c.solver.tolerance = values.tolerance;
   const double step = values.increment / strain_rate(c);

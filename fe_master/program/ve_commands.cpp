@@ -33,7 +33,7 @@ void refuse_ranks() {
 }
 
 void refuse_closed_form(const Case& c) {
-  if (c.material.type != MaterialType::volume_element)
+  if (!on_volume_elements(c))
     throw UserError(fmt::format(
         "{}: its material is a law in closed form; set material.type = \"volume_element\" to have one", c.file));
 }
@@ -122,8 +122,7 @@ int ve_path(const Arguments& arguments) {
   refuse_ranks();
   const Case c = read_path_case(arguments.file, arguments.overrides);
   const RunOptions options = run_options(arguments, c, "_ve");
-  if (c.material.type == MaterialType::volume_element)
-    return path_of_volume_element(c, options, arguments.noise_samples);
+  if (on_volume_elements(c)) return path_of_volume_element(c, options, arguments.noise_samples);
   return follow_path(c, *make_analytic_point(c), options, arguments.noise_samples);
 }
 

@@ -239,7 +239,7 @@ double lateral_pressure(const Case& c) {
   for (const Load& load : c.loads) {
     if (load.kind == LoadKind::pressure) return load.value;
   }
-  return c.material.type == MaterialType::volume_element ? c.ve.confining_stress : c.material.initial_pressure;
+  return on_volume_elements(c) ? c.ve.confining_stress : c.material.initial_pressure;
 }
 
 }  // namespace

@@ -27,9 +27,8 @@ NonlinearSolver& Problem::start(MaterialPoints& points) {
 }
 
 SolverParameters solver_parameters(const Case& c) {
-  const bool on_volume_elements = c.material.type == MaterialType::volume_element;
-  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_elements);
-  if (!on_volume_elements) return parameters;
+  SolverParameters parameters = with_default_tolerances(c.solver, on_volume_elements(c));
+  if (!on_volume_elements(c)) return parameters;
   parameters.answer_at = answer_at(c.ve);
   if (!is_given(parameters.qn_first)) parameters.qn_first = 0.5;  // their stress follows the rate of strain too
   if (!is_given(parameters.qn_scatter)) parameters.qn_scatter = 0.1;

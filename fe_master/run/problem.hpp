@@ -29,7 +29,7 @@ class Problem {
   const Loads& loads() const { return loads_; }
 
   /// Whether the material is a volume element, not a law in closed form.
-  bool on_volume_elements() const { return case_.material.type == MaterialType::volume_element; }
+  bool on_volume_elements() const { return femxdem::on_volume_elements(case_); }
   /// Laws in closed form of all points.
   std::vector<AnalyticLaw> laws() const;
   /// Volume elements to prepare, and which of them each point starts from.

@@ -82,10 +82,8 @@ double element_size(const Mesh& mesh) {
   return std::sqrt(area / static_cast<double>(mesh.elements.size()));
 }
 
-bool is_volume_element(const Case& c) { return c.material.type == MaterialType::volume_element; }
-
 BandModuli moduli_of(const Case& c) {
-  return is_volume_element(c) ? band_moduli(c.ve) : band_moduli(make_law(c.material));
+  return on_volume_elements(c) ? band_moduli(c.ve) : band_moduli(make_law(c.material));
 }
 
 void warn_of_coarse_mesh(const Case& c, const Mesh& mesh, const BandModuli& moduli, std::vector<std::string>& out) {
@@ -98,14 +96,14 @@ void warn_of_coarse_mesh(const Case& c, const Mesh& mesh, const BandModuli& modu
       "{:.3g} "
       "m, but {:g} are needed for the force and {:g} for the width; take elements of {:.3g} m or D = {:.3g} N",
       width, D, moduli.softening,
-      is_volume_element(c) ? ", 1.4 sigma_0 as in earlier runs" : " in plane-strain compression", width / size, size,
+      on_volume_elements(c) ? ", 1.4 sigma_0 as in earlier runs" : " in plane-strain compression", width / size, size,
       kElementsForForce, kElementsForWidth, width / kElementsForForce,
       D * std::pow(kElementsForForce * size / width, 2)));
 }
 
 bool has_imperfection(const Case& c) {
   const bool pool = c.ve.assignment == Assignment::random && c.ve.seeds.size() > 1;
-  const bool regions = is_volume_element(c) ? !c.ve_regions.empty() || pool : !c.material_regions.empty();
+  const bool regions = on_volume_elements(c) ? !c.ve_regions.empty() || pool : !c.material_regions.empty();
   return regions || c.solver.start_amplitude > 0 || c.body_force.x != 0 || c.body_force.y != 0;
 }
 
@@ -128,11 +126,11 @@ void warn_of_identical_points(const Case& c, const BandModuli& moduli, std::vect
       "solution stays homogeneous beyond the bifurcation, or leaves it by round-off; weaken a region ([[{}.region]]) "
       "or "
       "set solver.start_amplitude",
-      moduli.softening, is_volume_element(c) ? "ve" : "material"));
+      moduli.softening, on_volume_elements(c) ? "ve" : "material"));
 }
 
 void warn_of_rough_answers(const Case& c, std::vector<std::string>& out) {
-  if (!is_volume_element(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlowTrial) return;
+  if (!on_volume_elements(c) || c.ve.answer == VeAnswer::mean || c.ve.inertial_number > kSlowTrial) return;
   out.push_back(fmt::format(
       "at ve.inertial_number = {:g} the stress of a trial's end is a rough function of its strain: up to three times "
       "the evaluations, and rejected steps; leave ve.answer, solver.reuse_below and ve.hold_steps at their defaults",
@@ -198,7 +196,7 @@ std::vector<std::string> warnings(const Case& c, const Mesh& mesh) {
 }
 
 std::string preset_advice(const Case& c, const Mesh& mesh) {
-  if (c.ve.preset == VePreset::none || !is_volume_element(c)) return "";
+  if (c.ve.preset == VePreset::none || !on_volume_elements(c)) return "";
   const Preset& p = preset(c.ve.preset);
   std::string advice =
       "beyond the peak a band is one element wide: no mesh is fine enough, element.type = \"second_gradient\" is";

@@ -44,6 +44,10 @@ struct SolverParameters {
 };
 
 inline bool reuses(const SolverParameters& p) { return p.reuse_below > 0; }
+/// What learned ends need: corrections that are whole, from tangents that are learned.
+inline bool learns_whole_corrections(const SolverParameters& p) {
+  return p.global_operator == GlobalOperator::quasi_newton && !p.line_search && p.acceleration == Acceleration::none;
+}
 inline bool learns_ends(const SolverParameters& p) { return p.last_correction == LastCorrection::learned; }
 
 /// Columns of history.csv in which a step tells what learned tangents answered.
