@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <Eigen/Dense>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>

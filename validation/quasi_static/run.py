@@ -6,8 +6,8 @@
 The biaxial of validation/solver (second gradient) on 4 x 8 elements, increments of 1e-3 of axial strain, tolerance 5e-3. The
 name of a row: spheres, inertial number, answer (end; mean; late: the mean that belongs to 2/3 of the step), then what is not
 as usual: damping, 8x16 (elements), seed (packing), half or quarter (increment), learned (a step's last
-correction is answered by learned tangents). Rows `yade_alone`, `samples`: element_rates.py,
-samples.py.
+correction is answered by learned tangents). Rows `yade_alone`, `samples`, `roughness`: element_rates.py,
+samples.py, roughness.py.
 """
 
 import subprocess
@@ -65,6 +65,7 @@ ROWS = {key.name(): key for key in KEYS}
 OTHERS = {
     "yade_alone": "single volume elements: YADE alone, the element with the end and with the mean, at four rates",
     "samples": "a stress in every so many DEM steps: what it costs, what it changes",
+    "roughness": "single volume elements: what jumps along a line of neighbouring strains, by steps, spheres, damping, law",
 }
 
 
@@ -196,9 +197,10 @@ def work(c, chosen, strain, as_they_are):
     lines, curves, runs = [], [], {}
     if "yade_alone" in chosen and not as_they_are:
         element_rates.write(c)
-    if "samples" in chosen and not as_they_are:
-        said = subprocess.run(["/usr/bin/python3", HERE / "samples.py", c.program.parent], env=campaign.ENVIRONMENT, check=True, capture_output=True, text=True)
-        c.table([line for line in said.stdout.splitlines() if line.startswith("|")], mark="samples")
+    for script in ("samples", "roughness"):
+        if script in chosen and not as_they_are:
+            said = subprocess.run(["/usr/bin/python3", HERE / f"{script}.py", c.program.parent], env=campaign.ENVIRONMENT, check=True, capture_output=True, text=True)
+            c.table([line for line in said.stdout.splitlines() if line.startswith("|")], mark=script)
     for name in (n for n in chosen if n not in OTHERS):
         run = c.as_it_is(name) if as_they_are else c.run(CASE, name, *settings(ROWS[name], strain), c.cache, checkpoint_every=10)
         cells = run and measure(run)

@@ -1,0 +1,120 @@
+#!/usr/bin/python3
+"""How rough a function of the strain a trial's stress is: along a line of neighbouring strains, from one state.
+
+    roughness.py BUILD     # BUILD: folder of the compiled modules
+
+A cell is strained biaxially at constant volume, 1e-3 of axial strain in so many DEM steps; from each of several states trials
+of that many steps go to 0.9 to 1.1 of the next increment. Roughness: what a parabola through their stresses leaves, root of
+the mean square over that of the stress.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+INCREMENT = 1e-3  # of axial strain
+STATES = range(6, 26, 2)  # increments behind the states
+AROUND = np.linspace(-0.1, 0.1, 21)  # of the increment
+STEPS = (20, 50, 150, 500, 1500, 5000)
+ROWS = {  # what is changed of 1000 cohesive spheres with damping 0.2
+    "1000 spheres": {}, "400": {"spheres": 400}, "200": {"spheres": 200}, "damping 0.7": {"damping": 0.7},
+    "damping 0.05": {"damping": 0.05}, "friction alone": {"contact_law": "friction", "cohesion": 0.0},
+    "half of the time step, twice the steps": {"time_step_safety": 0.4},
+}
+SMALL_CELLS = 5  # of 200 spheres, in place of one of 1000
+
+
+def cell_of(**changes):
+    """A compact cell of a prepared packing."""
+    import compact_cell
+    import compact_scene
+    from cells import packing
+    from volume_element import Engine
+
+    engine = Engine([])
+    ve = engine.add(engine.make_template(packing(**{"spheres": 1000, "cohesion": 1.0, **changes}))["state"])
+    engine.info(ve)
+    return compact_cell.CompactCell.from_scene(compact_scene.export(engine.O))
+
+
+def lines_from(cell, steps, first=1.0):
+    """Stresses (states, strains, 9) of end and of mean along the line at each state; `first`: factor on the first increment. And
+    the inertial number."""
+    info = cell.info()
+    L = np.diag([1.0, -1.0, 0.0]) * INCREMENT / (steps * info["time_step"])
+    cell, found = cell.copy(), {"end": [], "mean": []}
+    for number in range(1, max(STATES) + 1):
+        cell.deform(L * (first if number == 1 else 1.0), steps)
+        if number in STATES:
+            lines = {"end": [], "mean": []}
+            for share in AROUND:
+                trial = cell.copy()
+                lines["mean"].append(np.array(trial.deform(L * (1 + share), steps, max(1, min(4, steps // 25)))).ravel())
+                lines["end"].append(np.array(trial.stress()).ravel())
+            for answer in found:
+                found[answer].append(lines[answer])
+    return {answer: np.array(of) for answer, of in found.items()}, np.sqrt(2) * L[0, 0] * info["time_scale"]
+
+
+def rough_part(lines):
+    """(states, strains, 9): what a parabola in the strain leaves, over the norm of the mean stress at the state."""
+    basis = np.vander(AROUND, 3)
+    left = lines - np.einsum("kl,slc->skc", basis @ np.linalg.pinv(basis), lines)
+    return left / np.linalg.norm(lines.mean(axis=1), axis=1)[:, None, None]
+
+
+def size(rough):
+    """Root of the mean square over the strains, median over the states."""
+    freedoms = len(AROUND) / (len(AROUND) - 3)
+    return np.median(np.sqrt((rough**2).sum(axis=2).mean(axis=1) * freedoms))
+
+
+def largest_jump(rough):
+    """Largest difference between neighbours over the root mean square one, median over the states: about 2 of noise without
+    memory, sqrt(20) of a single jump."""
+    differ = np.linalg.norm(np.diff(rough, axis=1), axis=2)
+    return np.median(differ.max(axis=1) / np.sqrt((differ**2).mean(axis=1)))
+
+
+def alike(one, other):
+    """Correlation of two rough parts, all states together."""
+    return (one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum())
+
+
+def said(roughs):
+    return f"{1e4 * size(roughs['end']):.2g} / {1e4 * size(roughs['mean']):.2g}"
+
+
+def main():
+    rows = {name: [] for name in ROWS}
+    extra = {f"{SMALL_CELLS} cells of 200, their mean": [], "largest jump over the root mean square": [],
+             "correlation of two copies, strained apart by 1e-6 once": []}
+    numbers = []
+    cells = {name: cell_of(**changes) for name, changes in ROWS.items()}
+    small = [cells["200"], *(cell_of(spheres=200, seed=seed) for seed in range(2, SMALL_CELLS + 1))]
+    for steps in STEPS:
+        for name, cell in cells.items():
+            lines, number = lines_from(cell, 2 * steps if "half" in name else steps)
+            roughs = {answer: rough_part(of) for answer, of in lines.items()}
+            rows[name].append(said(roughs))
+            if not ROWS[name]:
+                whole = roughs
+                numbers.append(f"{number:.1g}")
+        means, jumps, copies = extra
+        of_small = [lines_from(cell, steps)[0] for cell in small]
+        extra[means].append(said({a: rough_part(np.mean([of[a] for of in of_small], axis=0)) for a in whole}))
+        extra[jumps].append(" / ".join(f"{largest_jump(r):.1f}" for r in whole.values()))
+        copy, _ = lines_from(cells["1000 spheres"], steps, first=1 + 1e-3)
+        extra[copies].append(" / ".join(f"{alike(whole[a], rough_part(copy[a])):.2f}" for a in whole))
+        print(f"{steps} steps done", file=sys.stderr, flush=True)
+    print("| DEM steps of a trial | " + " | ".join(str(s) for s in STEPS) + " |\n" + "|---|" + "---|" * len(STEPS))
+    print("| I | " + " | ".join(numbers) + " |")
+    for name, cells_of_row in {**rows, **extra}.items():
+        print(f"| {name} | " + " | ".join(cells_of_row) + " |")
+
+
+if __name__ == "__main__":
+    sys.path[:0] = [sys.argv[1], str(ROOT / "yade_scripts"), str(ROOT / "tests" / "yade")]
+    main()
