@@ -12,7 +12,7 @@ namespace {
 /// Slow trials of a boundary value problem answer with their mean, and where points do, a step's last correction is
 /// learned: the choice of validation/quasi_static. A single element is drawn beside YADE's own tests: its ends.
 void complete_answers(Case& c, Purpose purpose, const Mistakes& m) {
-  const bool has_mean = c.ve.hold_steps == 0 && c.solver.reuse_below == 0;
+  const bool has_mean = c.ve.hold_steps == 0 && !reuses(c.solver);
   if (!m.has("ve.answer") && purpose == Purpose::run && has_mean && c.ve.inertial_number <= kSlowTrial)
     c.ve.answer = VeAnswer::mean;
   if (!m.has("solver.last_correction") && c.ve.answer == VeAnswer::mean && learns_whole_corrections(c.solver))

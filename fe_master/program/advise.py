@@ -131,7 +131,8 @@ def advise(case, file, program, folder, error, band, sets):
     """The Advice on a case (dictionary) of that file and values of --set."""
     points, answers = checked(program, case, file, sets)
     probes, said = Probes(program, case, file, folder), Advice()
-    base = probes.first(case.get("solver", {}).get("tolerance", 5e-3))
+    given = case.get("solver", {}).get("tolerance", 5e-3)
+    base = probes.first(given)
     manifest, engine, ve = probes.manifest, probes.summary["engine"], probes.effective["ve"]
     spheres = manifest["spheres"]
     if f"solver.tolerance={LOOSE:g}" in probes.solver:
@@ -145,7 +146,6 @@ def advise(case, file, program, folder, error, band, sets):
     rate = say_rate(said, compared, usual, limit, ve["inertial_number"], off)
     factor = say_increment(said, compared, usual, limit, case, off)
     tolerance, of_tolerance = tolerance_for(max(error / 2, 0.0025))
-    given = case.get("solver", {}).get("tolerance", 5e-3)
     said.numbers["tolerance"] = of_tolerance
     said.say("tolerance", f"solver.tolerance = {tolerance:g} errs by {percent(of_tolerance)} (this case: {given:g})",
              solver__tolerance=tolerance)

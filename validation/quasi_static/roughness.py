@@ -4,8 +4,8 @@
     roughness.py BUILD [STEPS ...]     # BUILD: folder of the compiled modules
 
 A cell is compressed in plane strain, the lateral stress kept as it was, 1e-3 of axial strain in so many DEM steps; from each of
-several states trials of that many steps go to 0.9 to 1.1 of the next increment. Roughness: what a parabola through their stresses leaves, root of
-the mean square over that of the stress.
+several states trials of that many steps go to 0.9 to 1.1 of the next increment. Roughness: what a parabola through their stresses
+leaves, root of the mean square over that of the stress.
 """
 
 import sys
@@ -18,10 +18,11 @@ INCREMENT = 1e-3  # of axial strain
 STATES = range(6, 22, 2)  # increments behind the states
 AROUND = np.linspace(-0.1, 0.1, 21)  # of the increment
 STEPS = (20, 50, 150, 500, 1500, 5000)
+WHOLE, SAFETY = "1000 spheres", 0.8  # the row that nothing is changed of, and its time step over the critical one
 ROWS = {  # what is changed of 1000 cohesive spheres with damping 0.2
-    "1000 spheres": {}, "400": {"spheres": 400}, "200": {"spheres": 200}, "damping 0.7": {"damping": 0.7},
+    WHOLE: {}, "400": {"spheres": 400}, "200": {"spheres": 200}, "damping 0.7": {"damping": 0.7},
     "damping 0.05": {"damping": 0.05}, "friction alone": {"contact_law": "friction", "cohesion": 0.0},
-    "half of the time step, twice the steps": {"time_step_safety": 0.4},
+    "half of the time step, twice the steps": {"time_step_safety": SAFETY / 2},
 }
 SMALL_CELLS = 5  # of 200 spheres, in place of one of 1000
 
@@ -34,7 +35,7 @@ def cell_of(**changes):
     from volume_element import Engine
 
     engine = Engine([])
-    ve = engine.add(engine.make_template(packing(**{"spheres": 1000, "cohesion": 1.0, **changes}))["state"])
+    ve = engine.add(engine.make_template(packing(**{"spheres": 1000, "cohesion": 1.0, "time_step_safety": SAFETY, **changes}))["state"])
     engine.info(ve)
     return compact_cell.CompactCell.from_scene(compact_scene.export(engine.O))
 
@@ -99,32 +100,32 @@ def said(roughs):
     return f"{1e4 * size(roughs['end']):.2g} / {1e4 * size(roughs['mean']):.2g}"
 
 
+def column(cells, small, steps):
+    """What the table says of trials of so many DEM steps, row by row; cells: of ROWS, small: in place of one of 1000 spheres."""
+    found, roughs = {}, {}
+    for name, cell in cells.items():
+        lines, number = lines_from(cell, round(steps * SAFETY / ROWS[name].get("time_step_safety", SAFETY)))
+        found.setdefault("I", f"{number:.1g}")
+        roughs[name] = {answer: rough_part(of) for answer, of in lines.items()}
+        found[name] = said(roughs[name])
+    whole, of_small = roughs[WHOLE], [lines_from(cell, steps)[0] for cell in small]
+    found[f"{len(small)} cells of 200, their mean"] = said({a: rough_part(np.mean([of[a] for of in of_small], axis=0)) for a in whole})
+    found["largest jump over the root mean square"] = " / ".join(f"{largest_jump(r):.1f}" for r in whole.values())
+    copy, _ = lines_from(cells[WHOLE], steps, first=1 + 1e-3)
+    found["correlation of two copies, strained apart by 1e-6 once"] = " / ".join(f"{alike(whole[a], rough_part(copy[a])):.2f}" for a in whole)
+    return found
+
+
 def main(trials):
-    rows = {name: [] for name in ROWS}
-    extra = {f"{SMALL_CELLS} cells of 200, their mean": [], "largest jump over the root mean square": [],
-             "correlation of two copies, strained apart by 1e-6 once": []}
-    numbers = []
     cells = {name: cell_of(**changes) for name, changes in ROWS.items()}
     small = [cells["200"], *(cell_of(spheres=200, seed=seed) for seed in range(2, SMALL_CELLS + 1))]
+    columns = []
     for steps in trials:
-        for name, cell in cells.items():
-            lines, number = lines_from(cell, 2 * steps if "half" in name else steps)
-            roughs = {answer: rough_part(of) for answer, of in lines.items()}
-            rows[name].append(said(roughs))
-            if not ROWS[name]:
-                whole = roughs
-                numbers.append(f"{number:.1g}")
-        means, jumps, copies = extra
-        of_small = [lines_from(cell, steps)[0] for cell in small]
-        extra[means].append(said({a: rough_part(np.mean([of[a] for of in of_small], axis=0)) for a in whole}))
-        extra[jumps].append(" / ".join(f"{largest_jump(r):.1f}" for r in whole.values()))
-        copy, _ = lines_from(cells["1000 spheres"], steps, first=1 + 1e-3)
-        extra[copies].append(" / ".join(f"{alike(whole[a], rough_part(copy[a])):.2f}" for a in whole))
+        columns.append(column(cells, small, steps))
         print(f"{steps} steps done", file=sys.stderr, flush=True)
     print("| DEM steps of a trial | " + " | ".join(str(s) for s in trials) + " |\n" + "|---|" + "---|" * len(trials))
-    print("| I | " + " | ".join(numbers) + " |")
-    for name, cells_of_row in {**rows, **extra}.items():
-        print(f"| {name} | " + " | ".join(cells_of_row) + " |")
+    for row in columns[0]:
+        print(f"| {row} | " + " | ".join(c[row] for c in columns) + " |")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from roughness import cell_of
+
 ROOT = Path(__file__).resolve().parents[2]
 NUMBER, STRAIN, CELLS = 2e-3, 2e-2, 8  # inertial number; a cell every 1/8 of that axial strain, biaxial at constant volume
 TRIALS, EVERY = (20, 50, 150, 300, 600), (2, 4, 8, 16)  # DEM steps
@@ -18,15 +20,7 @@ BLOCKS = 9
 
 def cells_and_rate(spheres):
     """Compact cells along the path, and the velocity gradient (3, 3) [1/s]."""
-    import compact_cell
-    import compact_scene
-    from cells import packing
-    from volume_element import Engine
-
-    engine = Engine([])
-    ve = engine.add(engine.make_template(packing(spheres=spheres, cohesion=1.0))["state"])
-    engine.info(ve)
-    cell = compact_cell.CompactCell.from_scene(compact_scene.export(engine.O))
+    cell = cell_of(spheres=spheres)
     L = np.diag([1.0, -1.0, 0.0]) / np.sqrt(2) * NUMBER / cell.info()["time_scale"]
     steps = int(STRAIN / CELLS / -L[1, 1] / cell.info()["time_step"])
     found = []
